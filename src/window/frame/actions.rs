@@ -6,13 +6,14 @@ use eframe::egui::{
 
 use super::{
     DecouplerWindow,
+    export_dialog::export_dialog_ui,
     help::{self, Help, Page, help_ui},
     top_bar::{DARK, LIGHT},
     tour::Tour,
 };
 use crate::window::{
     glossary::{self, Term},
-    shared::{Action, Effect, Offers, RecordingDraft, Shared, SourceKind},
+    shared::{Action, Effect, Exporting, Offers, RecordingDraft, Shared, SourceKind},
     theme::{Theme, space},
     widgets::dim_ui,
 };
@@ -27,6 +28,8 @@ pub(super) enum Overlay {
     Palette(Palette),
     /// The keys, or the glossary.
     Help(Help),
+    /// The form of an export.
+    Export(Exporting),
 }
 
 /// Keys of the views, in the order of the top bar.
@@ -52,11 +55,9 @@ impl DecouplerWindow {
         self.views.all()[self.shown].offer_actions(&mut offers, &self.shared, effects);
         // These have no keys, and take longer to list.
         if is_listed {
-            for export in self.views.all()[self.shown].exports(&self.shared) {
-                if offers.offer(export.action(), export.ask.is_ok())
-                    && let Ok(ask) = export.ask
-                {
-                    effects.push(ask());
+            for shown in self.views.all()[self.shown].shown(&self.shared) {
+                if offers.offer(shown.action(), shown.item.is_ok()) {
+                    effects.push(shown.ask());
                 }
             }
         }
@@ -139,6 +140,14 @@ impl DecouplerWindow {
                 Some(Reply::Close) => self.overlay = Overlay::None,
                 None => return,
             },
+            Overlay::Export(exporting) => {
+                let shown = self.views.all()[self.shown].shown(&self.shared);
+                let Some(effect) = export_dialog_ui(ui, exporting, shown) else {
+                    return;
+                };
+                self.overlay = Overlay::None;
+                self.apply_all(Vec::from_iter(effect));
+            }
             Overlay::Help(help) => match help_ui(ui, help, actions) {
                 Some(help::Reply::Tour) => self.begin_tour(),
                 Some(help::Reply::Close) => self.overlay = Overlay::None,

@@ -3,17 +3,17 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
-use super::{DecouplerWindow, clipboard::ToCopy, files::Found, remembered::is_within_limits, save_form::Saving};
+use super::{
+    DecouplerWindow, actions::Overlay, clipboard::ToCopy, files::ToWrite, remembered::is_within_limits,
+    save_form::Saving,
+};
 use crate::window::{
     job::caught,
     preview,
-    shared::{
-        Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, RecordingDraft, RunView, SourceKind,
-        refuse_in_use,
-    },
+    shared::{Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, RecordingDraft, RunView, SourceKind},
     test_view::HeightScale,
     theme,
-    training_worker::{Inspection, LOST, Request},
+    training_worker::{Inspection, LOST, Request, TrainedRun},
     views::CHECKPOINT,
 };
 use decoupler_core::{dataset::Simulation, evaluation::RunSettings};
@@ -92,11 +92,11 @@ impl DecouplerWindow {
             Effect::Look(look) => self.look(look),
             Effect::Watch(snapshot) => self.worker.watch(snapshot),
             Effect::ChooseFile(task) => {
-                if !self.dialogs.ask(&task, Arc::clone(&self.wake)) {
+                if !self.dialogs.ask(&task) {
                     self.type_path(task);
                 }
             }
-            Effect::TypePath(task) => self.type_path(task),
+            Effect::Export(exporting) => self.overlay = Overlay::Export(*exporting),
             Effect::Copy { text, notice } => self.copy_text(text, notice),
             Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
             Effect::KeepRun(file) => self.runs.keep(*file),
@@ -203,53 +203,16 @@ impl DecouplerWindow {
             Some(typed) => typed.path.clone(),
             None => task.suggested_path().display().to_string(),
         };
-        self.saving = Some(Saving::new(task, path));
+        self.saving = Some(Saving::new(task, path, None));
     }
 
-    /// Accepts the path typed in the form, after checking for a file there. Files to be read and folders are not
-    /// checked.
-    pub(super) fn take_typed(&mut self, path: PathBuf) {
-        let Some(task) = self.saving.as_ref().map(|saving| saving.task.clone()) else {
-            return;
-        };
-        // A folder is never replaced as a whole.
-        if task.is_read() || task.words.extensions.is_empty() {
-            return self.take_path(path);
-        }
-        // A file that is being written counts as existing.
-        let found = self.files.paths().any(|other| other == path).then_some(Found::File);
-        let used = self.files_in_use(&task);
-        if let Some(saving) = &mut self.saving {
-            saving.wait_for_check();
-            match found {
-                Some(found) => {
-                    saving.take(&path, found);
-                }
-                None => self.path_checks.start(path, used),
-            }
-        }
-        self.ctx.request_repaint();
-    }
-
-    /// Takes the results of checking typed paths.
-    pub(super) fn take_path_checks(&mut self) {
-        while let Some((path, found)) = self.path_checks.next_checked() {
-            let Some(saving) = &mut self.saving else { continue };
-            let was_checking = saving.checked_path().is_some();
-            if saving.take(&path, found) {
-                self.take_path(path);
-            } else if was_checking && saving.checked_path().is_none() {
-                self.stay_for_path();
-            }
-        }
-    }
-
-    /// Closes the form and carries out its task on the file at `path`.
-    pub(super) fn take_path(&mut self, path: PathBuf) {
+    /// Closes the form and carries out its task on the file at `path`; `asks` whether a file there may be replaced.
+    pub(super) fn take_typed(&mut self, path: PathBuf, asks: bool) {
         self.typed = self.saving.take();
         if let Some(typed) = self.typed.clone() {
-            self.answer(typed.task, path);
+            self.answer(typed.task, path, asks);
         }
+        self.ctx.request_repaint();
     }
 
     /// Returns the files in use, which the file of `task` must not overwrite.
@@ -263,36 +226,39 @@ impl DecouplerWindow {
         used
     }
 
-    /// Carries out `task` on the file at `path`.
-    pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
-        // A dialog of the desktop has asked whether to replace a file, but does not know which files are in use.
-        let used = self.files_in_use(&task);
+    /// Carries out `task` on the file at `path`; `asks` whether a file there may be replaced. A dialog of the desktop has
+    /// asked, but does not know which files are in use.
+    pub(super) fn answer(&mut self, task: FileTask, path: PathBuf, asks: bool) {
         if !self.take_path_on_closing(&task, &path) {
             return;
         }
-        match task.purpose {
-            Purpose::SaveTraining(run, contents) => {
+        match &task.purpose {
+            Purpose::Save(contents) => {
                 let (send, taken) = channel();
-                let inspection = Inspection::new(move |run| {
+                let (run, contents) = (contents.run, contents.clone());
+                let take = move |trained: Result<Option<&TrainedRun>, &str>| {
                     // The training continues if this panics.
                     let taken = caught("training", || {
-                        run.map_err(str::to_owned).and_then(|run| contents.take(run))
+                        trained
+                            .map_err(str::to_owned)
+                            .and_then(|trained| contents.take(trained))
                     });
-                    let taken = taken.map_err(|error| error.to_string()).flatten();
                     // The thread that writes the file is waiting for it.
-                    let _ = send.send(taken);
-                });
-                self.worker.ask(Request::Inspect(run, inspection));
-                self.files.write(path, move |path| {
-                    refuse_in_use(path, &used)?;
+                    let _ = send.send(taken.map_err(|error| error.to_string()).flatten());
+                };
+                match run {
+                    Some(run) => {
+                        let inspection = Inspection::new(move |trained| take(trained.map(Some)));
+                        self.worker.ask(Request::Inspect(run, inspection));
+                    }
+                    None => take(Ok(None)),
+                }
+                let used = self.files_in_use(&task);
+                self.files.write(ToWrite { task, path, asks }, used, move |path| {
                     let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
-                    taken?.write(path)
+                    taken?(path)
                 });
             }
-            Purpose::Save(contents) => self.files.write(path, move |path| {
-                refuse_in_use(path, &used)?;
-                contents.write(path)
-            }),
             Purpose::Choose(chosen) => {
                 // A view that has asked for another file since has no use for this one.
                 let _ = chosen.send(path);

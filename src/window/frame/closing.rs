@@ -4,7 +4,7 @@ use eframe::egui::{Align, Color32, Frame, Id, Layout, Margin, Modal, RichText, S
 
 use decoupler_core::text::counted;
 
-use super::{DecouplerWindow, save_form::Saving};
+use super::DecouplerWindow;
 use crate::window::{
     shared::{Effect, FileTask, Matter, Unfinished},
     theme::{Palette, Theme, semibold, space, type_size},
@@ -204,17 +204,9 @@ impl DecouplerWindow {
         lines
     }
 
-    /// Files that closing waits for: those being written, and the one to be written once its path has been checked.
+    /// Files that closing waits for.
     pub(super) fn awaited_files(&self) -> Vec<PathBuf> {
-        let checked = self.saving.as_ref().and_then(Saving::checked_path);
-        self.files.paths().map(Path::to_owned).chain(checked).collect()
-    }
-
-    /// Stays open for a question about the path of a file that closing was waiting for.
-    pub(super) fn stay_for_path(&mut self) {
-        if matches!(self.closing, Some(Closing::Finishing)) {
-            self.closing = None;
-        }
+        self.files.paths().map(Path::to_owned).collect()
     }
 
     /// Notes the path of `task` if it is one of the checkpoints to be saved before closing. Returns false if another of

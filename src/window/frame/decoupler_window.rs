@@ -5,13 +5,14 @@ use eframe::egui::{self, Context, Event, Frame as PanelFrame, Key, Margin, Modif
 
 use super::{
     actions::{Overlay, Undoing},
-    clipboard::{Clipboard, Copying, copy_menu_ui},
+    clipboard::{Clipboard, Copying},
     closing::Closing,
-    files::{Dialogs, Files, PathChecks},
+    export_dialog::{card_menu_ui, export_menu_ui},
+    files::{Dialogs, Files, open_folder},
     notices::{self, Notices, notice_ui},
     remembered::{Memory, Remembered, WindowFile},
     save_form::{self, Saving, save_form_ui},
-    top_bar::{Reach, edge_ui, export_menu_ui, top_bar_ui, widths_points},
+    top_bar::{Reach, edge_ui, top_bar_ui, widths_points},
     tour::{self, Tour, tour_ui},
 };
 use crate::signals::on_termination;
@@ -37,7 +38,6 @@ pub struct DecouplerWindow {
     pub(super) saving: Option<Saving>,
     /// The path last typed, offered again for the same file.
     pub(super) typed: Option<Saving>,
-    pub(super) path_checks: PathChecks,
     /// The checkpoint that the training of the Train view was opened from.
     pub(super) opened: Option<PathBuf>,
     pub(super) worker: Worker,
@@ -93,7 +93,6 @@ impl DecouplerWindow {
             notices: Notices::default(),
             saving: None,
             typed: None,
-            path_checks: PathChecks::new(Arc::clone(&wake)),
             opened: None,
             worker: Worker::start(Arc::clone(&wake)),
             keeping: None,
@@ -101,7 +100,7 @@ impl DecouplerWindow {
             runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
             copying: Copying::new(Clipboard::of(desktop), Arc::clone(&wake)),
-            dialogs: Dialogs::new(desktop),
+            dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
             closing: None,
             overlay: Overlay::None,
             // A window that cannot remember the end of the tour would begin it at every start.
@@ -229,7 +228,7 @@ impl DecouplerWindow {
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
                 top_bar_ui(ui, &self.names, self.shown, &actions, |ui| {
-                    export_menu_ui(ui, || view.exports(shared), &mut effects);
+                    export_menu_ui(ui, || view.shown(shared), &mut effects);
                     view.tools_ui(ui, shared, &mut effects);
                 })
             });
@@ -257,6 +256,7 @@ impl DecouplerWindow {
             let mut replies = Vec::new();
             for (place, (matter, notice)) in self.notices.iter().enumerate() {
                 let remedies = match matter {
+                    _ if matches!(notice, Notice::Saved(..)) => vec![notices::Reply::OpenFolder],
                     Matter::Training if shared.phase == Phase::Died => vec![notices::Reply::Restart],
                     Matter::Live if can_reconnect => vec![notices::Reply::Reconnect],
                     // From right to left.
@@ -274,7 +274,7 @@ impl DecouplerWindow {
             .into_iter()
             .flatten()
         {
-            copy_menu_ui(part, || view.exports(shared), &mut effects);
+            card_menu_ui(part, || view.shown(shared), &mut effects);
         }
         let remembered = &mut self.remembered;
         let (form, report) = (form.response.rect, report.map(|report| report.response.rect));
@@ -295,6 +295,11 @@ impl DecouplerWindow {
         for (place, reply) in replies.inner {
             match reply {
                 notices::Reply::Dismiss => self.notices.dismiss(place),
+                notices::Reply::OpenFolder => {
+                    if let Some((_, Notice::Saved(_, path))) = self.notices.iter().nth(place) {
+                        open_folder(path);
+                    }
+                }
                 notices::Reply::Restart => self.restart_worker(),
                 notices::Reply::Reconnect => self.views.live.retry(&self.shared, &mut effects),
                 notices::Reply::Resume => self.resume_cut_short(),
@@ -344,8 +349,7 @@ impl DecouplerWindow {
 
     fn ask_for_path(&mut self, ui: &mut Ui) {
         match self.saving.as_mut().and_then(|saving| save_form_ui(ui, saving)) {
-            Some(save_form::Reply::Path(path)) => self.take_typed(path),
-            Some(save_form::Reply::Replace(path)) => self.take_path(path),
+            Some(save_form::Reply::Path(path, asks)) => self.take_typed(path, asks),
             Some(save_form::Reply::Cancel) => self.saving = None,
             None => {}
         }

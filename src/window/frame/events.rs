@@ -1,7 +1,8 @@
 use super::{
     DecouplerWindow,
     applying::{have_same_sets, have_same_test_set, is_of_test_set},
-    files::Answer,
+    files::{Answer, ToWrite, Written},
+    save_form::{Saving, Tried},
 };
 use crate::window::{
     job::JobError,
@@ -29,12 +30,11 @@ impl DecouplerWindow {
         }
         while let Some((task, answer)) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(path) => self.answer(task, path),
+                Answer::Chosen(path) => self.answer(task, path, false),
                 Answer::NoDialog => self.type_path(task),
                 Answer::Cancelled => {}
             }
         }
-        self.take_path_checks();
         let mut effects = Vec::new();
         let mut working = Vec::new();
         for view in self.views.all() {
@@ -53,19 +53,22 @@ impl DecouplerWindow {
         self.request_preview();
     }
 
-    fn report_written(&mut self, written: Result<String, String>) {
-        let notice = match written {
-            Ok(message) => {
+    fn report_written(&mut self, (ToWrite { task, path, asks }, written): (ToWrite, Written)) {
+        let tried = match written {
+            Written::Done(message) => {
                 self.typed = None;
-                Notice::Done(message)
+                return self.notices.add(Matter::File, Notice::Saved(message, path));
             }
-            Err(reason) => {
+            Written::Exists => Tried::Exists,
+            Written::InUse(reason) if asks => Tried::Refused(reason),
+            Written::InUse(reason) | Written::Failed(reason) => {
                 // The user must see this.
                 self.closing = None;
-                Notice::Failed(reason)
+                return self.notices.fail(Matter::File, reason);
             }
         };
-        self.notices.add(Matter::File, notice);
+        self.closing = None;
+        self.saving = Some(Saving::new(task, path.display().to_string(), Some(tried)));
     }
 
     pub(super) fn take_preview(&mut self, event: PreviewEvent) {

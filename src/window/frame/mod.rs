@@ -7,6 +7,7 @@ mod clipboard;
 mod closing;
 mod decoupler_window;
 mod events;
+mod export_dialog;
 mod files;
 mod help;
 mod notices;

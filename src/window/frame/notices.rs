@@ -25,7 +25,7 @@ struct Entry {
 
 impl Entry {
     fn is_done(&self) -> bool {
-        matches!(self.notice, Notice::Done(_))
+        !matches!(self.notice, Notice::Failed(_))
     }
 }
 
@@ -33,7 +33,7 @@ impl Notices {
     /// Adds a notice. A success replaces all notices about the same matter; a failure replaces only successes and an
     /// identical failure.
     pub(super) fn add(&mut self, matter: Matter, notice: Notice) {
-        let is_success = matches!(notice, Notice::Done(_));
+        let is_success = !matches!(notice, Notice::Failed(_));
         let entries = &mut self.0;
         entries.retain(|old| old.matter != matter || !(is_success || old.is_done() || old.notice == notice));
         entries.push(Entry {
@@ -90,6 +90,8 @@ impl Notices {
 pub enum Reply {
     /// Dismiss it.
     Dismiss,
+    /// Show the folder of the file that was written.
+    OpenFolder,
     /// Restart the training thread.
     Restart,
     /// Connect again to the stream that has ended.
@@ -104,6 +106,7 @@ impl Reply {
     fn name(&self) -> &'static str {
         match self {
             Self::Dismiss => "Dismiss",
+            Self::OpenFolder => "Open folder",
             Self::Restart => "Start again",
             Self::Reconnect => "Try again",
             Self::Resume => "Resume",
@@ -119,7 +122,7 @@ pub fn notice_ui(ui: &mut Ui, notice: &Notice, remedies: Vec<Reply>) -> Option<R
     // The end of the program before is no failure of this one.
     let is_offer = remedies.iter().any(|reply| matches!(reply, Reply::Resume));
     let (text, colour) = match notice {
-        Notice::Done(text) => (text, palette.good),
+        Notice::Done(text) | Notice::Saved(text, _) => (text, palette.good),
         Notice::Failed(text) if is_offer => (text, palette.text),
         Notice::Failed(text) => (text, palette.bad),
     };
@@ -155,7 +158,7 @@ mod tests {
     fn texts(notices: &Notices) -> Vec<&str> {
         let all = notices.0.iter();
         all.map(|entry| match &entry.notice {
-            Notice::Done(text) | Notice::Failed(text) => text.as_str(),
+            Notice::Done(text) | Notice::Saved(text, _) | Notice::Failed(text) => text.as_str(),
         })
         .collect()
     }

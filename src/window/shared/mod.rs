@@ -3,7 +3,6 @@
 
 mod error_table;
 mod export;
-mod network_exports;
 mod offers;
 mod run_list;
 mod run_view;
@@ -14,11 +13,7 @@ mod view;
 pub use super::training_worker::RunResult;
 pub use error_table::error_table_ui;
 pub use export::{
-    Ask, Contents, Export, ExportGroup, FileTask, FileWords, Purpose, copy_exports, csv_export, error_table_export,
-    loss_export, picture_exports,
-};
-pub use network_exports::{
-    DecoderSource, NetworkSource, decoder_export_ui, decoder_forms_ui, file_stem, network_exports,
+    ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, file_stem, saying_saved,
 };
 pub use offers::{Action, FileInUse, Offers, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};

@@ -13,7 +13,7 @@ use decoupler_files::{
 };
 use eframe::egui::{ComboBox, RichText, Ui};
 
-use super::{FileTask, Look, SourceKind};
+use super::{Exporting, FileTask, Look, SourceKind};
 use crate::window::{
     glossary,
     theme::{Theme, space, type_size},
@@ -174,8 +174,8 @@ pub enum Effect {
     Watch(usize),
     /// Ask for the path of a file.
     ChooseFile(FileTask),
-    /// Ask for the path in the window itself.
-    TypePath(FileTask),
+    /// Let the user choose the form of an export.
+    Export(Box<Exporting>),
     /// Put this text on the clipboard.
     Copy {
         /// The text.
@@ -209,6 +209,8 @@ pub enum Effect {
 pub enum Notice {
     /// Success.
     Done(String),
+    /// A file was written at this path.
+    Saved(String, PathBuf),
     /// Failure, with what to do.
     Failed(String),
 }

@@ -15,7 +15,7 @@ use eframe::egui::{
     WidgetInfo, accesskit::Role, pos2, vec2,
 };
 
-use super::{Effect, Export, FileInUse, Offers, Shared, Unfinished, training_status_ui};
+use super::{Effect, FileInUse, Offers, Shared, Shown, Unfinished, training_status_ui};
 use crate::window::{
     surface_view::{ColourBar, SurfaceViewResponse},
     test_view::{HeightScale, SurfaceStyle},
@@ -72,9 +72,8 @@ pub trait View: Debug {
     /// Shows its tools at the right of the top bar, from right to left.
     fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Returns all exports, unavailable ones with the reason, in the order of the menu; forms of the same item follow each
-    /// other.
-    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
+    /// Returns what it shows and the user can export, or the reasons why that is not available now.
+    fn shown<'a>(&'a self, _shared: &'a Shared) -> Vec<Shown<'a>> {
         Vec::new()
     }
 

@@ -6,8 +6,8 @@ use std::{cell::RefCell, fmt::Display, ops::RangeInclusive, str::FromStr};
 pub(crate) use decoupler_core::sensor::short as input_text;
 pub use decoupler_core::text::capitalised;
 use eframe::egui::{
-    Align, ComboBox, Context, CornerRadius, DragValue, Id, Key, Layout, Rect, Response, Sense, Slider, Stroke,
-    TextEdit, Ui, Vec2, emath::Numeric, vec2,
+    Align, ComboBox, CornerRadius, DragValue, Id, Key, Layout, Rect, Response, Sense, Slider, Stroke, TextEdit, Ui,
+    Vec2, emath::Numeric, vec2,
 };
 
 use super::{
@@ -201,11 +201,6 @@ pub fn value_under(ui: &Ui, rect: Rect, text: &str) {
     }
 }
 
-/// Returns the value that was right-clicked in this frame, once.
-pub fn take_value_under(ctx: &Context) -> Option<String> {
-    ctx.data_mut(|data| data.remove_temp(id()))
-}
-
 fn claim_id() -> Id {
     Id::unique("right click is handled")
 }
@@ -215,11 +210,6 @@ pub fn claim_right_click(ui: &Ui, widget: &Response) {
     if widget.secondary_clicked() {
         ui.data_mut(|data| data.insert_temp(claim_id(), true));
     }
-}
-
-/// Returns true, once, if a widget handles the right click of this frame.
-pub fn take_claim(ctx: &Context) -> bool {
-    ctx.data_mut(|data| data.remove_temp(claim_id())).unwrap_or(false)
 }
 
 /// Range and default of a field.

@@ -10,7 +10,5 @@ pub use components::{
     invitation_ui, note_ui, placeholder_ui, primary_button, progress_bar_ui, refusal_ui, scrolled_ui,
     section_heading_ui, segmented_ui, snapshot_ui, state_ui, status_progress_ui, tabs_ui, with_shortcut,
 };
-pub use fields::{
-    claim_right_click, number_ui, slider_ui, take_claim, take_value_under, text_ui, usually, value_under,
-};
+pub use fields::{number_ui, slider_ui, text_ui, usually, value_under};
 pub use table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, described_table_ui};

@@ -1,4 +1,4 @@
-//! The body, the figures and the exports of the Compare view.
+//! The body, and the figures of the Compare view.
 
 use std::{sync::Arc, time::Duration};
 
@@ -12,7 +12,7 @@ use decoupler_core::{
 use decoupler_files::{
     export::{Table, TableColumn, format_duration, format_number, format_r2},
     figure::{
-        Decoded, Figure, PlotFigure, compared_losses_figure, regression_figure,
+        Decoded, PlotFigure, compared_losses_figure, regression_figure,
         surface::{Surface, SurfaceFigure},
     },
     import::Plan,
@@ -26,8 +26,8 @@ use super::{
 use crate::window::{
     plotting::{Pointer, plots_ui, titled_plots_ui},
     shared::{
-        Effect, Export, LoadedRun, Look, NetworkSource, PLACES, RightCard, RunList, Shared, View, colour_scale_ui,
-        copy_exports, follow_surface, network_exports, picture_exports, target_choice_ui, view_mode_ui,
+        Effect, LoadedRun, Look, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, View, colour_scale_ui,
+        follow_surface, target_choice_ui, view_mode_ui,
     },
     surface_view::{ColourBar, SurfaceView},
     test_view::TestSet,
@@ -58,8 +58,8 @@ impl View for CompareView {
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        compare_exports(self, shared)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        compared(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -267,44 +267,40 @@ pub(super) fn losses(runs: &RunList) -> Option<PlotFigure> {
     (a.is_some() || b.is_some()).then(|| compared_losses_figure(runs))
 }
 
-/// Returns the exports: networks of both runs, pictures and table.
-pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> Vec<Export<'a>> {
+/// Returns what the view shows: networks of both runs, pictures and table.
+pub(super) fn compared<'a>(view: &'a CompareView, shared: &'a Shared) -> Vec<Shown<'a>> {
     let runs = &shared.runs;
-    let mut exports = Vec::new();
+    let mut shown = Vec::new();
     for (place, letter) in PLACES.into_iter().enumerate() {
         let run = runs.pinned(place);
+        let name = run
+            .as_ref()
+            .map_or_else(|| letter.to_owned(), |run| format!("{letter}: {}", run.name));
         let source = run.map(|run| NetworkSource::Kept(run.name.to_owned(), Arc::clone(run.file)));
         let source = source.ok_or_else(|| format!("No run is chosen as {letter}: choose one in the list."));
-        exports.extend(network_exports(&format!("{letter}: "), &source, Vec::new));
+        shown.extend(Shown::network(&name, source, Vec::new()));
     }
-    // Both networks share a section of the menu.
-    exports.sort_by_key(|export| export.group);
-    let nothing = || "No run is chosen: choose one in the list.".to_owned();
-    let figure = view.figure(shared);
-    let surfaces = if figure.surfaces.is_empty() {
-        Err(nothing())
-    } else {
-        Ok(move || Figure::from(figure.clone()))
+    let is_any = (0..PLACES.len()).any(|place| runs.pinned(place).is_some());
+    let any = || {
+        is_any
+            .then_some(())
+            .ok_or_else(|| "No run is chosen: choose one in the list.".to_owned())
     };
-    exports.extend(picture_exports("Surfaces", "compared-surfaces".to_owned(), surfaces));
+    let surfaces = any().map(|()| || view.figure(shared).into());
+    shown.push(Shown::figure("Surfaces", "compared-surfaces".to_owned(), surfaces));
     for (place, letter) in PLACES.into_iter().enumerate() {
         if let Some(regression) = view.regression(place) {
             let stem = format!("regression-{}", letter.to_lowercase());
-            let regression = Ok(move || Figure::from(regression.clone()));
-            exports.extend(picture_exports(&format!("Regression of {letter}"), stem, regression));
+            let regression = Ok(move || regression.clone().into());
+            shown.push(Shown::figure(&format!("Regression of {letter}"), stem, regression));
         }
     }
-    let losses = losses(runs).ok_or_else(nothing);
-    let losses = losses.map(|losses| move || Figure::from(losses.clone()));
-    exports.extend(picture_exports("Loss chart", "compared-loss".to_owned(), losses));
-    let is_any = (0..PLACES.len()).any(|place| runs.pinned(place).is_some());
-    let table = if is_any {
-        Ok(|| compared_table(runs))
-    } else {
-        Err(nothing())
-    };
-    exports.extend(copy_exports("Table of both runs", table));
-    exports
+    let losses = losses(runs).ok_or_else(|| "No run is chosen: choose one in the list.".to_owned());
+    let losses = losses.map(|losses| move || losses.clone().into());
+    shown.push(Shown::figure("Loss chart", "compared-loss".to_owned(), losses));
+    let table = any().map(|()| || compared_table(runs));
+    shown.push(Shown::table("Table of both runs", "compared".to_owned(), table));
+    shown
 }
 
 /// Describes the differences between a run on an array and the paper's scene and inputs; empty if there are none.

@@ -1,4 +1,4 @@
-//! The form, the status line and the exports of an experiment.
+//! The form and the status line of an experiment.
 
 use std::sync::Arc;
 
@@ -26,10 +26,7 @@ use super::{
     sweep_folder::folder_form_ui,
 };
 use crate::window::{
-    shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Shared, copy_exports, csv_export,
-        picture_exports,
-    },
+    shared::{Effect, FileTask, FileWords, Shared, Shown},
     theme::{Theme, space},
     widgets::{
         dim_ui,
@@ -323,26 +320,14 @@ pub fn open_cell(shared: &Shared, outcome: &Outcome, cell: usize, effects: &mut 
     effects.push(Effect::ShowTraining);
 }
 
-const CELLS: FileWords = FileWords {
-    kind: "table",
-    description: "The values of every cell with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
-const TRIALS: FileWords = FileWords {
-    kind: "trials",
-    description: "Every trial with its seed and errors, as CSV.",
-    extensions: &["csv"],
-};
-
 const MARKDOWN: FileWords = FileWords {
     kind: "table",
     description: "The table as shown with the settings behind it, as Markdown.",
     extensions: &["md"],
 };
 
-/// Returns the exports of the current experiment: figure and tables.
-pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap) -> Vec<Export<'_>> {
+/// Returns what the view shows of the current experiment: figure and tables.
+pub(super) fn shown(view: &ExperimentsView, colours: SequentialMap) -> Vec<Shown<'_>> {
     let topic = view.topic;
     let stem = topic.name().to_lowercase().replace(' ', "_");
     let outcome = view.outcome().filter(|outcome| outcome.trials().0 > 0);
@@ -353,38 +338,27 @@ pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap)
             figure => figure,
         }
     });
-    let mut exports: Vec<Export<'_>> = picture_exports("Figure", stem.clone(), figure).collect();
+    let table = outcome.clone().map(|outcome| || outcome.table.table());
     let cells = outcome.clone().map(|outcome| || cells_table(&outcome.results));
-    exports.push(csv_export("Table", CELLS, stem.clone(), cells));
     let trials = outcome.clone().map(|outcome| || trials_table(&outcome.results));
-    exports.push(csv_export("Every trial", TRIALS, format!("{stem}_trials"), trials));
-    exports.push(Export {
-        group: ExportGroup::Tables,
-        name: "Table with settings".to_owned(),
-        form: "Markdown".to_owned(),
-        description: MARKDOWN.description,
-        ask: outcome.clone().map(|outcome| -> Ask<'_> {
-            Box::new(move || {
-                let results = Arc::clone(&outcome.results);
-                let contents = Contents::new(move |path| {
-                    let conditions = describe_conditions(&results.experiment);
-                    atomic_write(path, |writer| {
-                        write_experiment_markdown(&topic.heading(), &conditions, &results, writer)
-                    })
-                });
-                Effect::ChooseFile(FileTask::save(MARKDOWN, &stem, contents))
+    let markdown = outcome.clone().map(|outcome| {
+        let (results, heading) = (Arc::clone(&outcome.results), topic.heading());
+        FileTask::save(MARKDOWN, &stem, move |path| {
+            let conditions = describe_conditions(&results.experiment);
+            atomic_write(path, |writer| {
+                write_experiment_markdown(&heading, &conditions, &results, writer)
             })
-        }),
+        })
     });
-    exports.extend(copy_exports(
-        "Table",
-        outcome.clone().map(|outcome| || outcome.table.table()),
-    ));
+    let shown = [
+        Shown::figure("Figure", stem.clone(), figure),
+        Shown::table("Table", format!("{stem}_table"), table),
+        Shown::table("Every cell", stem.clone(), cells),
+        Shown::table("Every trial", format!("{stem}_trials"), trials),
+        Shown::file("Table with settings", markdown),
+    ];
     match outcome {
-        Ok(outcome) => exports
-            .into_iter()
-            .map(|export| export.noting(&outcome.is_saved))
-            .collect(),
-        Err(_) => exports,
+        Ok(outcome) => shown.map(|shown| shown.noting(&outcome.is_saved)).into(),
+        Err(_) => shown.into(),
     }
 }

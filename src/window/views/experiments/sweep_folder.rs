@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::window::{
     job::{Background, Report, Wake},
-    shared::{Contents, Effect, FileTask, FileWords, Purpose},
+    shared::{Effect, FileTask, FileWords},
     theme::{Theme, semibold, space, type_size},
     widgets::{
         ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui,
@@ -63,11 +63,7 @@ impl SweepFolder {
 
     /// Asks for a folder.
     pub(in crate::window::views::experiments) fn choose(&self) -> FileTask {
-        FileTask {
-            words: FOLDER,
-            suggestion: String::new(),
-            purpose: Purpose::Choose(self.choices.clone()),
-        }
+        FileTask::choose(FOLDER, "", self.choices.clone())
     }
 
     /// The current folder.
@@ -390,13 +386,12 @@ const SPECIFICATION: FileWords = FileWords {
 };
 
 fn specification_task(specification: Value) -> FileTask {
-    let contents = Contents::new(move |path| {
+    FileTask::save(SPECIFICATION, "sweep", move |path| {
         atomic_write(path, |writer| {
             serde_json::to_writer_pretty(&mut *writer, &specification)?;
             writeln!(writer)
         })
-    });
-    FileTask::save(SPECIFICATION, "sweep", contents)
+    })
 }
 
 /// Sweeps on other machines: saves the sweep of the form as a specification, opens a folder that is being filled.

@@ -13,13 +13,13 @@ use eframe::egui::{Align, FontId, Key, Label, Layout, Modifiers, RichText, Sense
 
 use super::{
     ExperimentLook, ExperimentsView, Outcome, Topic,
-    panel::{self, experiment_exports, open_cell},
+    panel::{self, open_cell},
     state::ExperimentEvent,
     sweep_folder::folder_card_ui,
 };
 use crate::window::{
     plotting::{CellPointed, Pointer, heat_map_ui, plots_ui},
-    shared::{Effect, Export, Matter, Notice, Offers, Shared, Unfinished, View},
+    shared::{Effect, Matter, Notice, Offers, Shared, Shown, Unfinished, View},
     theme::{Theme, semibold, space, type_size},
     widgets::{
         ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, card_ui, ghost_button, invitation_ui,
@@ -87,8 +87,8 @@ impl View for ExperimentsView {
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        experiment_exports(self, shared.look.colours)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        panel::shown(self, shared.look.colours)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

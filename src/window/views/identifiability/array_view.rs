@@ -1,4 +1,4 @@
-//! Identifiability of an array: pictures, findings, status line and exports.
+//! Identifiability of an array: pictures, findings and status line.
 
 use std::{ops::RangeInclusive, sync::Arc};
 
@@ -16,7 +16,7 @@ use super::{Analysis, IdentifiabilityView};
 use crate::window::{
     glossary,
     plotting::titled_plots_ui,
-    shared::{Effect, Export, Look, Shared, colour_scale_ui, follow_surface, picture_exports, view_mode_ui},
+    shared::{Effect, Look, Shared, Shown, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
     test_view::Frame,
     theme::{Theme, semibold, space, type_size},
@@ -186,8 +186,8 @@ fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
     *axis = segmented_ui(ui, "Displayed axis", &options, *axis, false).unwrap_or(*axis);
 }
 
-/// Returns the exports: surfaces and singular values.
-pub(super) fn analysis_exports<'a>(view: &'a IdentifiabilityView, shared: &'a Shared) -> Vec<Export<'a>> {
+/// Returns what the view shows: surfaces and singular values.
+pub(super) fn shown<'a>(view: &'a IdentifiabilityView, shared: &'a Shared) -> Vec<Shown<'a>> {
     let analysis = view.analysis.as_ref();
     let analysis = analysis.ok_or_else(|| match &view.problem {
         Some(problem) => problem.clone(),
@@ -198,9 +198,10 @@ pub(super) fn analysis_exports<'a>(view: &'a IdentifiabilityView, shared: &'a Sh
         move || Figure::from(identifiability_figure(view, analysis, place, shared.look))
     });
     let values = analysis.map(|analysis| || Figure::from(singular_values(analysis)));
-    let surfaces = picture_exports("Surfaces", "identifiability".to_owned(), surfaces);
-    let values = picture_exports("Singular values", "singular-values".to_owned(), values);
-    surfaces.chain(values).collect()
+    vec![
+        Shown::figure("Surfaces", "identifiability".to_owned(), surfaces),
+        Shown::figure("Singular values", "singular-values".to_owned(), values),
+    ]
 }
 
 /// Shows the state of the analysis in the line at the bottom.

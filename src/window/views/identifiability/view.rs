@@ -9,12 +9,12 @@ use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeri
 
 use super::{
     IdentifiabilityView, Question,
-    array_view::{analysis_exports, identifiability_ui, status_ui},
+    array_view::{identifiability_ui, shown, status_ui},
     recording,
 };
 use crate::window::{
     glossary,
-    shared::{Effect, Export, Offers, Shared, SourceKind, Unfinished, View},
+    shared::{Effect, Offers, Shared, Shown, SourceKind, Unfinished, View},
     theme::space,
     widgets::{
         dim_ui,
@@ -69,10 +69,10 @@ impl View for IdentifiabilityView {
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
         match shared.source {
-            SourceKind::Array => analysis_exports(self, shared),
-            SourceKind::Recording => recording::study_exports(&self.study),
+            SourceKind::Array => shown(self, shared),
+            SourceKind::Recording => recording::shown(&self.study),
         }
     }
 

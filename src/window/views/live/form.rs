@@ -14,7 +14,7 @@ use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 
 use super::LiveView;
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Purpose, RunList, Shared},
+    shared::{Effect, FileTask, FileWords, RunList, Shared},
     theme::space,
     widgets::{
         dim_ui,
@@ -118,7 +118,10 @@ impl SourceForm {
                      in a header.";
         match self.kind {
             SourceKind::Simulated => {
-                let (hint, rate) = ("Rate at which the simulated array is read.", &mut self.frames_per_second);
+                let (hint, rate) = (
+                    "Rate at which the simulated array is read.",
+                    &mut self.frames_per_second,
+                );
                 quantity_ui(ui, "Frames per second", hint, rate, 0.1..=10_000.0, "Hz");
             }
             SourceKind::Replay => text_ui(ui, "Frames", FRAMES.description, &mut self.path),
@@ -253,10 +256,16 @@ impl NetworkChoice {
     fn picks(&self, runs: &RunList) -> Vec<(Pick, String)> {
         let newest = runs.workspace.runs.last();
         let newest = newest.map_or_else(|| "no run yet".to_owned(), |run| format!("Newest run: {}", run.name));
-        let file = self.file.as_ref().map(|(name, _)| (Pick::File, format!("File: {name}")));
+        let file = self
+            .file
+            .as_ref()
+            .map(|(name, _)| (Pick::File, format!("File: {name}")));
         let runs = runs.workspace.runs.iter().rev();
         let runs = runs.map(|run| (Pick::Run(run.id), run.name.clone()));
-        std::iter::once((Pick::Newest, newest)).chain(runs).chain(file).collect()
+        std::iter::once((Pick::Newest, newest))
+            .chain(runs)
+            .chain(file)
+            .collect()
     }
 }
 
@@ -280,11 +289,15 @@ fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut V
                 another one is chosen.";
     combo.response.labelled_by(label.id).on_hover_text(hint);
     if let Some((_, file)) = view.network.network(runs) {
-        let rows = file.problem.sensor.as_ref().map(|simulation| match simulation.scene.rows {
-            Rows::All => ", all rows".to_owned(),
-            Rows::Known => ", known rows".to_owned(),
-            Rows::One(row) => format!(", row {} alone", row + 1),
-        });
+        let rows = file
+            .problem
+            .sensor
+            .as_ref()
+            .map(|simulation| match simulation.scene.rows {
+                Rows::All => ", all rows".to_owned(),
+                Rows::Known => ", known rows".to_owned(),
+                Rows::One(row) => format!(", row {} alone", row + 1),
+            });
         let (source, hidden) = (file.source_name(), file.settings.hidden);
         dim_ui(ui, &format!("{source}, {hidden} hidden{}", rows.unwrap_or_default()));
         let name = if file.problem.has_nodes() { "Z error" } else { "Error" };
@@ -329,10 +342,7 @@ fn open_ui(ui: &mut Ui, view: &mut LiveView, text: &str, words: FileWords, effec
     if ui.add(ghost_button(text)).on_hover_text(words.description).clicked() {
         let (send, chosen) = channel();
         view.chosen = Some((words, chosen));
-        effects.push(Effect::ChooseFile(FileTask {
-            words,
-            suggestion: words.file_name(words.kind),
-            purpose: Purpose::Choose(send),
-        }));
+        let suggestion = format!("{}.{}", words.kind, words.extensions[0]);
+        effects.push(Effect::ChooseFile(FileTask::choose(words, &suggestion, send)));
     }
 }

@@ -1,11 +1,10 @@
 //! The tools: buttons, keys and names of the actions, the replay bar, and the exports.
 
-use std::{fs::File, io, path::Path, sync::Arc};
+use std::{fs::File, io, sync::Arc};
 
 use decoupler_core::problem::Channel;
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, WriteError, atomic_write, is_same},
-    figure::Figure,
+    export::{Cell, Table, TableColumn, atomic_write, is_same},
     live::Recorded,
 };
 use eframe::egui::{Align, Key, Label, Layout, Modifiers, RichText, Slider, Ui, Widget, WidgetInfo};
@@ -13,9 +12,7 @@ use eframe::egui::{Align, Key, Label, Layout, Modifiers, RichText, Slider, Ui, W
 use super::{LiveView, cards::surface_figure, snapshot::Answered};
 use crate::window::{
     glossary,
-    shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Offers, Shared, csv_export, picture_exports,
-    },
+    shared::{Effect, FileTask, FileWords, Offers, Shared, Shown},
     theme::{Theme, space, type_size},
     widgets::{dim_ui, ghost_button, primary_button, slider_ui, with_shortcut},
 };
@@ -193,88 +190,57 @@ fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
     dim_ui(ui, "Speed");
 }
 
-/// Returns the exports: pictures of the latest answer, the values over time, and the recording.
-pub fn exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
+/// Returns what the view shows: the surfaces, the readings and their recording, or the values over time.
+pub fn shown<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Shown<'a>> {
     let answer = view.shown.answer.as_deref();
     let answer = answer.ok_or_else(|| "There is no frame yet: start a source.".to_owned());
-    let surface = answer
-        .clone()
-        .map(|answer| move || Figure::from(surface_figure(answer, None, shared.look)));
-    if let Ok(answer) = answer
+    let surface = answer.clone();
+    let surface = surface.map(|answer| || surface_figure(answer, None, shared.look).into());
+    let surface = Shown::figure("Surface", "live-surface".to_owned(), surface);
+    if let Ok(answer) = &answer
         && let Some(chart) = &answer.chart
     {
-        let values = Ok(move || values_table(answer));
-        let chart = Ok(move || Figure::from(chart.clone()));
-        let surface = picture_exports("Surface", "live-surface".to_owned(), surface);
-        return picture_exports("Decoded values", "live-values".to_owned(), chart)
-            .chain(surface.filter(|_| !answer.surfaces.is_empty()))
-            .chain([csv_export("Decoded values", VALUES, "live-values".to_owned(), values)])
-            .collect();
+        let (chart, values) = (Ok(|| chart.clone().into()), Ok(|| values_table(answer)));
+        let chart = Shown::figure("Decoded values", "live-values".to_owned(), chart);
+        let values = Shown::table("Decoded values", "live-values".to_owned(), values);
+        let surface = (!answer.surfaces.is_empty()).then_some(surface);
+        return [chart].into_iter().chain(surface).chain([values]).collect();
     }
-    let readings = answer.map(|answer| {
-        move || {
-            Figure::from(
-                answer
-                    .readings
-                    .clone()
-                    .unwrap_or_default()
-                    .coloured(shared.look.colours),
-            )
-        }
-    });
+    let readings = answer.and_then(|answer| answer.readings.as_ref().ok_or_else(String::new));
+    let readings = readings.map(|readings| || readings.clone().coloured(shared.look.colours).into());
     let recorded = view.shown.recorded.as_ref().map(save_recording);
-    let recorded = recorded.map(|task| -> Ask<'a> { Box::new(move || Effect::ChooseFile(task)) });
-    let recording = Export {
-        group: ExportGroup::Tables,
-        name: "Recording".to_owned(),
-        form: "CSV".to_owned(),
-        description: RECORDING.description,
-        ask: recorded.ok_or_else(|| "Nothing is recorded: press Record while a source runs.".to_owned()),
-    };
-    picture_exports("Surface", "live-surface".to_owned(), surface)
-        .chain(picture_exports("Readings", "live-readings".to_owned(), readings))
-        .chain([recording])
-        .collect()
+    let recorded = recorded.ok_or_else(|| "Nothing is recorded: press Record while a source runs.".to_owned());
+    vec![
+        surface,
+        Shown::figure("Readings", "live-readings".to_owned(), readings),
+        Shown::file("Recording", recorded),
+    ]
 }
-
-const VALUES: FileWords = FileWords {
-    kind: "decoded values",
-    description: "The decoded values with their times, in full precision, as CSV: all so far of a recording, and the last 20 s of a \
-                  stream.",
-    extensions: &["csv"],
-};
-
-const RECORDING: FileWords = FileWords {
-    kind: "recording",
-    description: "Every frame with its time, as CSV: a line for each row-wire. It can be replayed here, and the \
-                  terminal command decode reads it.",
-    extensions: &["csv"],
-};
 
 fn values_table(answer: &Answered) -> Table {
     let names = answer.network.problem.targets.iter().map(Channel::title);
+    let columns = std::iter::once("time_s".to_owned()).chain(names);
     let row = |(time_s, values): &(f64, Arc<[f64]>)| {
         let values = std::iter::once(time_s).chain(values.iter());
         values.map(|&value| Cell::from(value)).collect()
     };
     Table {
-        columns: std::iter::once("time_s".to_owned())
-            .chain(names)
-            .map(TableColumn::field)
-            .collect(),
+        columns: columns.map(TableColumn::field).collect(),
         rows: answer.history.all().iter().map(row).collect(),
     }
 }
 
 /// Saves a copy of a recording.
 pub fn save_recording(recorded: &Recorded) -> FileTask {
-    let from = recorded.path.clone();
-    let write = move |path: &Path| -> Result<(), WriteError> {
-        // The chosen path may be that of the recording itself.
-        if is_same(path, &from) {
-            return Ok(());
-        }
-        atomic_write(path, |file| io::copy(&mut File::open(&from)?, file).map(drop))
+    let words = FileWords {
+        kind: "recording",
+        description: "Every frame with its time, as CSV: a line for each row-wire. It can be replayed here, and the terminal \
+                      command decode reads it.",
+        extensions: &["csv"],
     };
-    FileTask::save(RECORDING, "recording", Contents::new(write))
+    let from = recorded.path.clone();
+    FileTask::save(words, "recording", move |path| match is_same(path, &from) {
+        true => Ok(()),
+        false => atomic_write(path, |file| io::copy(&mut File::open(&from)?, file).map(drop)),
+    })
 }

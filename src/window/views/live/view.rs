@@ -24,7 +24,7 @@ use super::{
 };
 use crate::window::{
     job::{Background, Wake},
-    shared::{Effect, Export, FileInUse, FileWords, Matter, Notice, Offers, Shared, View},
+    shared::{Effect, FileInUse, FileWords, Matter, Notice, Offers, Shared, Shown, View},
     theme::{Palette, Theme, type_size},
     widgets::state_ui,
 };
@@ -394,8 +394,8 @@ impl View for LiveView {
         tools::tools_ui(ui, self, shared, effects);
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        tools::exports(self, shared)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        tools::shown(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

@@ -12,23 +12,21 @@ use eframe::egui::{
 use super::PointWish;
 use crate::window::{
     plotting::{Pointer, colour, plots_ui},
-    shared::{DecoderSource, decoder_forms_ui},
     theme::{Theme, semibold, type_size},
-    widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, claim_right_click, dim_ui},
+    widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui},
 };
 
 /// Half the side of the square in which a point responds to the pointer.
 const REACH: f32 = 7.0;
 
 /// Shows both charts in the remaining space, with one point marked. A click marks a point and asks to load it, if it
-/// can be loaded; a right-click opens the formats in which its decoder can be exported from `source`.
+/// can be loaded.
 pub fn charts_ui(
     ui: &mut Ui,
     level: &TradeOffLevel,
     figure: &PlotFigure,
     marked: &mut Option<usize>,
     can_load: bool,
-    source: impl Fn(usize) -> Option<DecoderSource>,
 ) -> Option<PointWish> {
     let drawn = plots_ui(ui, "trade-off", figure, Pointer::Picks);
     let mut wish = None;
@@ -47,13 +45,6 @@ pub fn charts_ui(
                 *marked = Some(number);
                 wish = can_load.then_some(PointWish::Load(number));
             }
-            claim_right_click(ui, &response);
-            response.context_menu(|ui| {
-                dim_ui(ui, &format!("Export {}", point_name(point)));
-                let source = source(number);
-                let task = source.and_then(|source| decoder_forms_ui(ui, point.report.kind, &source));
-                wish = wish.take().or(task.map(|task| PointWish::Export(Box::new(task))));
-            });
         }
     }
     wish

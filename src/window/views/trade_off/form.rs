@@ -24,7 +24,7 @@ use super::{
     state::{PlannedLevel, PlannedRun},
 };
 use crate::window::{
-    shared::{DecoderSource, decoder_export_ui},
+    shared::{Exporting, NetworkSource},
     theme::{Theme, semibold, space, type_size},
     widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
 };
@@ -321,7 +321,7 @@ pub fn choices_ui(
     level: &TradeOffLevel,
     look: &mut TradeOffLook,
     can_load: bool,
-    source: impl Fn(usize) -> Option<DecoderSource>,
+    source: impl Fn(usize) -> Option<NetworkSource>,
 ) -> Option<PointWish> {
     let [fastest, most_accurate] = level.answers(&look.limits);
     section_heading_ui(ui, "Recommended decoders");
@@ -399,7 +399,7 @@ fn marked_ui(
     number: usize,
     point: &TradeOffPoint,
     can_load: bool,
-    source: Option<&DecoderSource>,
+    source: Option<&NetworkSource>,
 ) -> Option<PointWish> {
     let mut wish = None;
     let name = RichText::new(point_name(point)).font(semibold(type_size().note));
@@ -412,9 +412,10 @@ fn marked_ui(
             .clicked();
         wish = is_loaded.then_some(PointWish::Load(number));
         if let Some(source) = source {
-            let button = ghost_button("Export this decoder…");
-            let task = decoder_export_ui(ui, button, point.report.kind, source);
-            wish = wish.take().or(task.map(|task| PointWish::Export(Box::new(task))));
+            if ui.add(ghost_button("Export this decoder…")).clicked() {
+                let exporting = Exporting::decoder(point.report.kind, source.clone());
+                wish = Some(PointWish::Export(Box::new(exporting)));
+            }
         }
     });
     dim_ui(ui, &format!("{}.", point_facts(point).join("; ")));

@@ -24,7 +24,7 @@ use decoupler_files::{
 use super::TradeOffForm;
 use crate::window::{
     job::{Background, Report, Wake},
-    shared::{DecoderSource, Effect, FileTask, Matter, NetworkSource, Shared, View as _},
+    shared::{Effect, Exporting, Matter, NetworkSource, Shared, View as _},
 };
 
 /// The Trade-off view.
@@ -47,7 +47,7 @@ pub(super) enum PointWish {
     /// Load its configuration into the Train view.
     Load(usize),
     /// Write its decoder to a file.
-    Export(Box<FileTask>),
+    Export(Box<Exporting>),
 }
 
 /// State of the display of a measurement.
@@ -125,14 +125,14 @@ impl TradeOffOutcome {
     }
 
     /// Returns the samples and the network from which the decoder of a point can be exported.
-    pub(super) fn source_of(&self, level: usize, point: usize) -> Option<DecoderSource> {
+    pub(super) fn source_of(&self, level: usize, point: usize) -> Option<NetworkSource> {
         let setup = self.setup_of(level, point)?;
         Some(match self.networks.get(&(level, point)) {
             Some(file) => {
                 let name = point_name(self.levels.get(level)?.points.get(point)?);
-                DecoderSource::Run(NetworkSource::Kept(name, Arc::clone(file)))
+                NetworkSource::Kept(name, Arc::clone(file))
             }
-            None => DecoderSource::Samples(Box::new(setup), self.recorded.clone()),
+            None => NetworkSource::Samples(Box::new(setup), self.recorded.clone()),
         })
     }
 }

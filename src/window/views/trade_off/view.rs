@@ -22,10 +22,7 @@ use super::{
     state::TradeOffEvent,
 };
 use crate::window::{
-    shared::{
-        Effect, Export, FileWords, Matter, Notice, Offers, Shared, SourceKind, Unfinished, View, copy_exports,
-        csv_export, picture_exports, sentence,
-    },
+    shared::{Effect, Matter, Notice, Offers, Shared, Shown, SourceKind, Unfinished, View, sentence},
     theme::{Theme, semibold, space, type_size},
     widgets::{
         card_ui, dim_ui, fields::count_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
@@ -103,8 +100,8 @@ impl View for TradeOffView {
         }
     }
 
-    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
-        trade_off_exports(self)
+    fn shown<'a>(&'a self, _shared: &'a Shared) -> Vec<Shown<'a>> {
+        shown(self)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -160,7 +157,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
             return;
         }
         let figure = trade_off_figure(level, &look.limits);
-        asked = charts_ui(ui, level, &figure, &mut look.marked, can_load, source);
+        asked = charts_ui(ui, level, &figure, &mut look.marked, can_load);
     });
     let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
     let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);
@@ -185,7 +182,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
                 effects.extend([Effect::TakeSetup(Box::new(setup)), Effect::ShowTraining]);
             }
         }
-        Some(PointWish::Export(task)) => effects.push(Effect::ChooseFile(*task)),
+        Some(PointWish::Export(exporting)) => effects.push(Effect::Export(exporting)),
         None => {}
     }
     trade.look = look;
@@ -279,14 +276,8 @@ fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
     });
 }
 
-const POINTS: FileWords = FileWords {
-    kind: "points",
-    description: "Every point, of an array at every noise level, with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
-/// Returns the exports: charts and table at the displayed noise level, and every point.
-pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
+/// Returns what the view shows: charts and table at the displayed noise level, and every point.
+pub(super) fn shown(view: &TradeOffView) -> Vec<Shown<'_>> {
     let stem = || "trade_off".to_owned();
     let outcome = view.outcome.as_ref().filter(|outcome| outcome.points().0 > 0);
     let outcome = outcome.ok_or_else(|| "No point is measured yet: press Measure first.".to_owned());
@@ -300,19 +291,16 @@ pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
     let charts = level
         .clone()
         .map(|level| move || Figure::from(trade_off_figure(level, &view.look.limits)));
-    let mut exports: Vec<Export<'_>> = picture_exports("Charts", stem(), charts).collect();
     let points = outcome.clone().map(|outcome| || trade_off_points(&outcome.levels));
-    exports.push(csv_export("All points", POINTS, stem(), points));
-    exports.extend(copy_exports(
-        "Trade-off table",
-        level.map(|level| move || trade_off_summary(level)),
-    ));
+    let table = level.map(|level| move || trade_off_summary(level));
+    let shown = [
+        Shown::figure("Charts", stem(), charts),
+        Shown::table("All points", stem(), points),
+        Shown::table("Trade-off table", stem(), table),
+    ];
     match outcome {
-        Ok(outcome) => exports
-            .into_iter()
-            .map(|export| export.noting(&outcome.is_saved))
-            .collect(),
-        Err(_) => exports,
+        Ok(outcome) => shown.map(|shown| shown.noting(&outcome.is_saved)).into(),
+        Err(_) => shown.into(),
     }
 }
 

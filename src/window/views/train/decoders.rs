@@ -17,12 +17,12 @@ use decoupler_files::{
     export::{format_number, format_r2},
     import::Setup,
 };
-use eframe::egui::{Button, CollapsingHeader, Ui, Vec2};
+use eframe::egui::{Button, CollapsingHeader, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
     glossary,
     job::{Background, JobError, Report, Wake},
-    shared::{DecoderSource, FileTask, Phase, Shared, decoder_export_ui, target_choice_ui},
+    shared::{Exporting, NetworkSource, Phase, Shared, target_choice_ui},
     theme::{Theme, space},
     training_worker::RunId,
     widgets::{ColumnWidth, TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
@@ -263,8 +263,8 @@ pub fn decoders_ui(
     phase: Phase,
     (problem, model_based): (&Problem, Option<&Errors>),
     target: &mut usize,
-    source: Option<&DecoderSource>,
-) -> Option<FileTask> {
+    source: Option<&NetworkSource>,
+) -> Option<Exporting> {
     let mut asked = None;
     ui.add_space(space(1));
     let header = CollapsingHeader::new("More decoders")
@@ -298,8 +298,8 @@ fn measured_ui(
     measured: &[DecoderResult],
     (problem, model_based): (&Problem, Option<&Errors>),
     target: &mut usize,
-    source: Option<&DecoderSource>,
-) -> Option<FileTask> {
+    source: Option<&NetworkSource>,
+) -> Option<Exporting> {
     let palette = Theme::of(ui).palette;
     // Ratios to rounding are meaningless.
     let model_based = model_based.filter(|errors| !errors.is_rounding());
@@ -332,15 +332,17 @@ fn measured_ui(
         let row = TableRow::figures(result.kind.name(result.precision), cells)
             .meaning(result.kind.meaning())
             .colour(colour);
-        // The menu has both precisions.
+        // The dialog has both precisions.
         let source = source.filter(|_| result.precision == Precision::Double && matches!(result.report, Some(Ok(_))));
         match source {
             None => row,
             Some(source) => row.controls(|ui| {
                 let button = Button::new("…").min_size(Vec2::splat(space(5)));
-                let task = decoder_export_ui(ui, button, result.kind, source);
-                if task.is_some() {
-                    asked.replace(task);
+                let button = ui.add(button);
+                let name = format!("Export {}…", result.kind.name(Precision::Double));
+                button.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
+                if button.on_hover_text(name).clicked() {
+                    asked.replace(Some(Exporting::decoder(result.kind, source.clone())));
                 }
             }),
         }

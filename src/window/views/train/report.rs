@@ -20,13 +20,11 @@ use decoupler_files::{
     export::{Cell, Table, TableColumn, describe_search, format_duration, format_number},
     figure::frame_time,
 };
-use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Layout, RichText, Ui};
 
 use crate::window::{
     glossary,
-    shared::{
-        DecoderSource, Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence,
-    },
+    shared::{Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
     test_view::TestView,
     theme::{Theme, space, type_size},
     views::train::{
@@ -67,11 +65,10 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
             let measured = (&*run.problem, model_based);
             let is_open = view.decoders.is_open;
-            let run_source = || NetworkSource::Training(run.id, Box::new(run.setup.clone()));
-            let source = is_open.then(|| DecoderSource::Run(run_source()));
+            let source = is_open.then(|| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
             let (decoders, target) = (&mut view.decoders, &mut view.target);
             let asked = decoders_ui(ui, decoders, shared.phase, measured, target, source.as_ref());
-            effects.extend(asked.map(Effect::ChooseFile));
+            effects.extend(asked.map(|exporting| Effect::Export(Box::new(exporting))));
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.problem, run.settings().combine, &run.starts);
             search_ui(ui, run);
@@ -335,27 +332,13 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
 }
 
-const PATH_BUTTON_WIDTH: f32 = space(24);
-
-/// Two buttons that ask for the path of a checkpoint.
+/// The button that asks for the path of a checkpoint.
 fn open_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-    ui.horizontal(|ui| {
-        let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
-        let button = ghost_button("Open checkpoint…").min_size([width, space(7)].into());
-        let task = open_task(shared);
-        if ui.add(button).on_hover_text(task.words.description).clicked() {
-            effects.push(Effect::ChooseFile(task.clone()));
-        }
-        let path = ui.add(ghost_button("Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
-        let is_enabled = path.enabled();
-        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, "Type the path of a checkpoint"));
-        if path
-            .on_hover_text("Type the path instead of choosing the file.")
-            .clicked()
-        {
-            effects.push(Effect::TypePath(task));
-        }
-    });
+    let button = ghost_button("Open checkpoint…").min_size([ui.available_width(), space(7)].into());
+    let task = open_task(shared);
+    if ui.add(button).on_hover_text(task.words.description).clicked() {
+        effects.push(Effect::ChooseFile(task));
+    }
 }
 
 fn is_badly_conditioned(outlook: &Outlook) -> bool {

@@ -10,10 +10,10 @@ use super::{
     configuration::configuration_ui,
     decoders::{DecoderMeasuring, DecodersState},
     drawn::{Drawn, Frames},
-    exports::{PaperFigure, checkpoint_task, train_exports},
+    exports::{PaperFigure, checkpoint_task, shown},
     inspect::{Lighting, SectionChoice, TestPlace, drawn_nodes},
     press::{PressState, readings_head_ui},
-    recording::{RecordingEditor, recipe_export},
+    recording::{RecordingEditor, recipe_task},
     report::{self, report_ui},
     scrub::ScrubState,
     surfaces::surfaces_ui,
@@ -21,8 +21,8 @@ use super::{
 use crate::window::{
     job::Wake,
     shared::{
-        Columns, Effect, Export, FileInUse, Look, Matter, Notice, Offers, Phase, RightCard, RunCommand, RunResult,
-        RunView, Shared, SourceKind, Unfinished, View, run_buttons_ui,
+        Columns, Effect, FileInUse, Look, Matter, Notice, Offers, Phase, RightCard, RunCommand, RunResult, RunView,
+        Shared, Shown, SourceKind, Unfinished, View, run_buttons_ui,
     },
     test_view::RecordedTest,
     theme::space,
@@ -143,10 +143,10 @@ impl View for TrainView {
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        let mut exports = train_exports(self, shared);
-        exports.push(recipe_export(shared));
-        exports
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        let mut shown = shown(self, shared);
+        shown.push(Shown::file("Recipe", recipe_task(shared)));
+        shown
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

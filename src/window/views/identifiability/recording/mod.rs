@@ -4,4 +4,4 @@ mod study;
 mod view;
 
 pub use study::RecordingStudy;
-pub use view::{body_ui, form_ui, offer_actions, status_ui, study_exports};
+pub use view::{body_ui, form_ui, offer_actions, shown, status_ui};

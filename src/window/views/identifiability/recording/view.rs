@@ -1,4 +1,4 @@
-//! The form, the results and the exports of the study of a recording.
+//! The form, and the results of the study of a recording.
 
 use decoupler_core::text::counted;
 use decoupler_files::{
@@ -12,7 +12,7 @@ use super::{
     study::{FoldsResult, RecordingFindings, UnderWay},
 };
 use crate::window::{
-    shared::{Export, FileWords, Offers, Shared, copy_exports, csv_export, error_table_ui, sentence},
+    shared::{Offers, Shared, Shown, error_table_ui, sentence},
     theme::{Theme, space, type_size},
     widgets::{
         card_ui, dim_ui, fields::count_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
@@ -170,23 +170,14 @@ pub fn findings_ui(ui: &mut Ui, found: &RecordingFindings) {
     );
 }
 
-const HELD_OUT: FileWords = FileWords {
-    kind: "cross-validation table",
-    description: "Errors of each target over all samples, each tested by models fitted to the other folds, with every \
-                  digit, as CSV.",
-    extensions: &["csv"],
-};
-
-/// Returns the exports: the errors of the cross-validation.
-pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
+/// Returns what the view shows: the errors of the cross-validation.
+pub fn shown(study: &RecordingStudy) -> Vec<Shown<'_>> {
     let validated = study.validated.as_deref();
     let source = validated.map_or(String::new(), |validated| validated.setup.source_name());
     let validated = validated.ok_or_else(|| "Nothing is cross-validated yet: press “Cross-validate” first.".to_owned());
     let errors = validated.map(|validated| move || error_table(&validated.table));
     let stem = format!("{source}-cross-validation");
-    let mut exports = vec![csv_export("Cross-validation table", HELD_OUT, stem, errors.clone())];
-    exports.extend(copy_exports("Cross-validation table", errors));
-    exports
+    vec![Shown::table("Cross-validation table", stem, errors)]
 }
 
 /// Largest number of folds offered.

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::window::{
     job::Wake,
-    shared::{Effect, FileInUse, FileTask, FileWords, Matter, Notice, Purpose, RecordingDraft, Shared, SourceKind},
+    shared::{Effect, FileInUse, FileTask, FileWords, Matter, Notice, RecordingDraft, Shared, SourceKind},
     training_worker::RunId,
 };
 use decoupler_core::{
@@ -71,11 +71,7 @@ impl Default for ChosenPaths {
 impl ChosenPaths {
     /// Returns the task of asking for a path.
     pub(super) fn task(&self, words: FileWords, suggestion: String) -> FileTask {
-        FileTask {
-            words,
-            suggestion,
-            purpose: Purpose::Choose(self.sender.clone()),
-        }
+        FileTask::choose(words, suggestion, self.sender.clone())
     }
 
     fn take(&self) -> Vec<PathBuf> {

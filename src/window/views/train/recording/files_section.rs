@@ -18,7 +18,7 @@ use super::{
     editor::RecordingEditor,
 };
 use crate::window::{
-    shared::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Shared, file_stem, sentence},
+    shared::{Effect, FileTask, FileWords, Shared, file_stem, sentence},
     widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
 };
 
@@ -104,20 +104,14 @@ impl RecordingEditor {
                 let find = ui.add(ghost_button("Find…"));
                 find.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Find {name}")));
                 let find = find.on_hover_text("Choose the file in its new place. Its contents are checked.");
-                let typed = ui.add(ghost_button("Type path…"));
-                typed.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Type the path of {name}")));
-                if !find.clicked() && !typed.clicked() {
+                if !find.clicked() {
                     return;
                 }
                 let (_, paths) = self
                     .finding
                     .insert((path.clone(), super::editor::ChosenPaths::default()));
                 let task = paths.task(FILES, name.clone());
-                effects.push(if find.clicked() {
-                    Effect::ChooseFile(task)
-                } else {
-                    Effect::TypePath(task)
-                });
+                effects.push(Effect::ChooseFile(task));
             });
         }
         if is_training {
@@ -167,12 +161,6 @@ impl RecordingEditor {
             };
             if ui.add(ghost_button(text)).on_hover_text(FILES.description).clicked() {
                 effects.push(Effect::ChooseFile(self.open_task()));
-            }
-            let typed = ui.add(ghost_button("Type path…"));
-            typed.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Type the path of a recording"));
-            let typed = typed.on_hover_text("Type the path instead of choosing the file.");
-            if typed.clicked() {
-                effects.push(Effect::TypePath(self.open_task()));
             }
             if self.opening.under_way.is_some() {
                 if ui.add(ghost_button("Cancel")).clicked() {
@@ -268,22 +256,13 @@ const RECIPE: FileWords = FileWords {
     extensions: &["json"],
 };
 
-/// Returns the export of the recipe of the source.
-pub fn recipe_export(shared: &Shared) -> Export<'static> {
-    let ask = shared.setup().map(|setup| -> Ask<'static> {
-        Box::new(move || {
-            let stem = file_stem("recipe", &setup);
-            let contents = Contents::new(move |path| RecipeFile::from(&setup).save(path));
-            Effect::ChooseFile(FileTask::save(RECIPE, &stem, contents))
-        })
-    });
-    Export {
-        group: ExportGroup::Training,
-        name: "Recipe".to_owned(),
-        form: "JSON".to_owned(),
-        description: RECIPE.description,
-        ask,
-    }
+/// Returns the file of the recipe of the source.
+pub fn recipe_task(shared: &Shared) -> Result<FileTask, String> {
+    let setup = shared.setup()?;
+    let stem = file_stem("recipe", &setup);
+    Ok(FileTask::save(RECIPE, &stem, move |path| {
+        RecipeFile::from(&setup).save(path)
+    }))
 }
 
 /// An import to be opened again: its plan, and the known checksums of its files.

@@ -182,20 +182,10 @@ pub(super) fn positions_ui(ui: &mut Ui, task: FileTask, effects: &mut Vec<Effect
         "Targets that are deformations or forces at places of the skin, such as taxels: with their positions the actual and \
          the decoded surface of each test sample are shown. The file has the header target,x,y, in millimetres.",
     );
-    ui.horizontal(|ui| {
-        let button = ui.add(ghost_button("Positions file…"));
-        if button.on_hover_text(POSITIONS.description).clicked() {
-            effects.push(Effect::ChooseFile(task.clone()));
-        }
-        let typed = ui.add(ghost_button("Type path…"));
-        typed.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Type the path of the positions"));
-        if typed
-            .on_hover_text("Type the path instead of choosing the file.")
-            .clicked()
-        {
-            effects.push(Effect::TypePath(task));
-        }
-    });
+    let button = ui.add(ghost_button("Positions file…"));
+    if button.on_hover_text(POSITIONS.description).clicked() {
+        effects.push(Effect::ChooseFile(task));
+    }
 }
 
 const TEST_FILES: FileWords = FileWords {

@@ -13,4 +13,4 @@ mod opening;
 
 pub(super) use columns_card::bias;
 pub use editor::RecordingEditor;
-pub use files_section::recipe_export;
+pub use files_section::recipe_task;
