@@ -20,7 +20,6 @@ use crate::window::{
     plotting::{cells_ui, titled_plots_ui},
     shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
-    test_view::HeightScale,
     theme::{Theme, semibold, space, type_size},
     widgets::{
         card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
@@ -136,21 +135,7 @@ fn surfaces_ui(
 
 /// Returns the surfaces of an answer on a common scale.
 pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
-    let dressed = |surface: &Surface| {
-        let heights = surface.nodes.iter().map(|node| node.z).filter(|z| z.is_finite());
-        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
-        let range = match look.heights {
-            // The resolution is a nanometre.
-            HeightScale::Fitted if low <= high => low..=high.max(low + 1e-6),
-            HeightScale::Fitted | HeightScale::Stroke => surface.range.clone(),
-        };
-        Surface {
-            range,
-            mode: look.mode,
-            colours: look.colours,
-            ..surface.clone()
-        }
-    };
+    let dressed = |surface: &Surface| look.dressed(surface, surface.title.clone());
     SurfaceFigure {
         surfaces: answer.surfaces.iter().map(dressed).collect(),
         camera: look.camera,
@@ -193,33 +178,28 @@ const TRAIN: &str = "Train a network now";
 
 /// Returns the heading and the text of an empty view, and its button.
 fn invitation(view: &LiveView, shared: &Shared) -> (String, String, Option<&'static str>) {
-    let counts = &view.shown.counts;
     if let Some(running) = &view.running {
-        let source = match &running.source {
-            SourcePlan::Simulated(_) => "the simulated source".to_owned(),
-            SourcePlan::Replay(path) => format!("'{}'", path.display()),
-            SourcePlan::Stream(source) => source.to_string(),
-        };
+        let counts = &view.shown.counts;
         let text = match &counts.last_bad {
             Some(reason) => format!("Malformed lines: {}. Last: {reason}.", counts.bad),
             None => "It appears here as soon as it arrives.".to_owned(),
         };
-        return (format!("Waiting for the first frame from {source}"), text, None);
+        return (
+            format!("Waiting for the first frame from {}", running.source_text()),
+            text,
+            None,
+        );
     }
-    let Some((name, file)) = view.network.network(&shared.runs) else {
-        let (text, button) = match shared.phase.is_busy() {
-            true => (
-                "Live decoding needs a trained network. One is being trained in the Train view: it can be used here as soon \
-                 as it is finished.",
-                None,
-            ),
-            false => (
-                "Live decoding needs a trained network. Train one with the settings of the Train view, which takes from \
-                 seconds to minutes, or open a network file.",
-                Some(TRAIN),
-            ),
+    let Some((name, file)) = view.network(shared) else {
+        let is_busy = shared.phase.is_busy();
+        let text = match is_busy {
+            true => "One is being trained in the Train view: it can be used here as soon as it is finished.",
+            false => {
+                "Train one with the settings of the Train view, which takes from seconds to minutes, or open a network file."
+            }
         };
-        return ("No network yet".to_owned(), text.to_owned(), button);
+        let text = format!("Live decoding needs a trained network. {text}");
+        return ("No network yet".to_owned(), text, (!is_busy).then_some(TRAIN));
     };
     let (text, button) = match view.plan(shared).map(|(_, plan)| plan.source) {
         Err(obstacle) => (obstacle, None),
@@ -291,9 +271,7 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
     section_heading_ui(ui, "Stream");
     stream_ui(ui, &view.shown.counts);
     if answer.readings.is_some() {
-        section_heading_ui(ui, "Zero");
         zero_ui(ui, view);
-        section_heading_ui(ui, "Recording");
         recording_ui(ui, view, shared, effects);
     }
     ui.add_space(space(2));
@@ -309,27 +287,19 @@ fn stream_ui(ui: &mut Ui, counts: &Tally) {
         [Some(median), Some(high)] => format!("p50 {}, p99 {}", format_duration(median), format_duration(high)),
         _ => format_number(None),
     };
-    for (name, hint, value) in [
-        ("Rate", "Frames per second (recent).", rate),
-        (
-            "Latency",
-            "Time from reading a frame to its answer: median, and the 99th percentile, which one frame in a hundred exceeds.",
-            latency,
-        ),
-        ("Decoded", "Frames decoded since the start.", counts.decoded.to_string()),
-        (
-            "Dropped",
-            "Frames (lines of a device) that were replaced by newer ones before they could be decoded.",
-            counts.dropped.to_string(),
-        ),
-        (
-            "Bad",
-            "Malformed lines, and frames that could not be decoded.",
-            counts.bad.to_string(),
-        ),
-    ] {
-        fact_ui(ui, name, hint, &value);
-    }
+    fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
+    let hint = "Time from reading a frame to its answer: median, and the 99th percentile, which one frame in a hundred exceeds.";
+    fact_ui(ui, "Latency", hint, &latency);
+    fact_ui(
+        ui,
+        "Decoded",
+        "Frames decoded since the start.",
+        &counts.decoded.to_string(),
+    );
+    let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
+    fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
+    let hint = "Malformed lines, and frames that could not be decoded.";
+    fact_ui(ui, "Bad", hint, &counts.bad.to_string());
     if let Some(reason) = &counts.last_bad {
         dim_ui(ui, &format!("Last: {reason}"));
     }
@@ -337,12 +307,9 @@ fn stream_ui(ui: &mut Ui, counts: &Tally) {
 
 fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
     let Some(ZeroGains { gains, in_contact, .. }) = &view.shown.zero else {
-        dim_ui(
-            ui,
-            "Readings are compared with the model at rest. Re-zero uses the current state of the array instead.",
-        );
         return;
     };
+    section_heading_ui(ui, "Zero");
     let (low, high) = gains.iter().fold((f64::MAX, f64::MIN), |(low, high), &gain| {
         (low.min(gain), high.max(gain))
     });
@@ -367,19 +334,12 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
 }
 
 fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let Some(recorded) = view.shown.recorded.clone() else {
-        dim_ui(
-            ui,
-            "Record keeps every frame with its time, to be replayed with any network.",
-        );
+    // The status line shows one that is under way.
+    let Some(recorded) = view.shown.recorded.clone().filter(|_| !view.is_recording()) else {
         return;
     };
+    section_heading_ui(ui, "Recording");
     let length = format!("{}, {:.1} s", counted(recorded.frames, "frame"), recorded.seconds);
-    if view.is_recording() {
-        let bad = Theme::of(ui).palette.bad;
-        ui.label(RichText::new(format!("● {length}")).size(type_size().note).color(bad));
-        return;
-    }
     dim_ui(ui, &format!("Recorded {length}.")).on_hover_text(recorded.path.display().to_string());
     ui.horizontal(|ui| {
         let replay = ui.add_enabled(recorded.frames > 0, ghost_button("Replay recording"));

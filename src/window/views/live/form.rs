@@ -1,9 +1,6 @@
 //! The form on the left: the network that decodes, and the source of what it decodes.
 
-use std::{
-    path::PathBuf,
-    sync::{Arc, mpsc::channel},
-};
+use std::sync::{Arc, mpsc::channel};
 
 use decoupler_core::{dataset::Simulation, scene::Rows};
 use decoupler_files::{
@@ -14,7 +11,7 @@ use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 
 use super::LiveView;
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, RunList, Shared},
+    shared::{Effect, FileTask, FileWords, Shared},
     theme::space,
     widgets::{
         dim_ui,
@@ -166,7 +163,7 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         section_heading_ui(ui, "Network");
         network_ui(ui, view, shared, effects);
         section_heading_ui(ui, "Source");
-        let simulation = view.network.network(&shared.runs).map(|(_, file)| file.problem.sensor);
+        let simulation = view.network(shared).map(|(_, file)| file.problem.sensor);
         let has_sensor = view.has_sensor(shared);
         ui.add_enabled_ui(view.running.is_none(), |ui| {
             let kinds = [
@@ -208,87 +205,41 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
     });
 }
 
-/// The network that decodes.
-#[derive(Debug, Default)]
-pub struct NetworkChoice {
-    /// Its place.
-    pub pick: Pick,
-    /// The picked run.
-    pub run: Option<Arc<NetworkFile>>,
-    /// The file that was opened last, and its name.
-    pub file: Option<(String, Arc<NetworkFile>)>,
-}
-
-/// Place of the network.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pick {
-    /// The newest run of the list.
-    #[default]
-    Newest,
-    /// The run with this number.
-    Run(u64),
-    /// The file that was opened.
-    File,
-}
-
-/// A network that was read for this view.
-#[derive(Debug)]
-pub enum Loaded {
-    /// Of the run with this number.
-    Run(u64, Arc<NetworkFile>),
-    /// From a file of this name; that of the sample with its recording.
-    File(String, Arc<NetworkFile>, Option<PathBuf>),
-}
-
-impl NetworkChoice {
-    /// Returns the chosen network and its name; `None` if there is none.
-    pub fn network<'a>(&'a self, runs: &'a RunList) -> Option<(&'a str, &'a Arc<NetworkFile>)> {
-        let picked = match self.pick {
-            Pick::File => self.file.as_ref().map(|(name, file)| (&**name, file)),
-            Pick::Run(id) => runs.run(id).map(|run| &*run.name).zip(self.run.as_ref()),
-            Pick::Newest => None,
-        };
-        // A run that was removed is replaced by the newest.
-        picked.or_else(|| runs.newest().map(|run| (run.name, run.file)))
-    }
-
-    /// Returns the networks that can be picked, with their texts.
-    fn picks(&self, runs: &RunList) -> Vec<(Pick, String)> {
-        let newest = runs.workspace.runs.last();
-        let newest = newest.map_or_else(|| "no run yet".to_owned(), |run| format!("Newest run: {}", run.name));
-        let file = self
-            .file
-            .as_ref()
-            .map(|(name, _)| (Pick::File, format!("File: {name}")));
-        let runs = runs.workspace.runs.iter().rev();
-        let runs = runs.map(|run| (Pick::Run(run.id), run.name.clone()));
-        std::iter::once((Pick::Newest, newest))
-            .chain(runs)
-            .chain(file)
-            .collect()
-    }
+/// A network that is decoded with instead of the newest.
+#[derive(Clone, Debug)]
+pub struct Picked {
+    /// Number of its run; `None` if it was opened from a file.
+    pub run: Option<u64>,
+    /// Its name.
+    pub name: String,
+    /// The network.
+    pub file: Arc<NetworkFile>,
 }
 
 /// Shows the list of networks, and what the chosen one is.
 fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let runs = &shared.runs;
-    let (picks, mut pick) = (view.network.picks(runs), view.network.pick);
-    let shown = picks.iter().find(|(of, _)| *of == pick).unwrap_or(&picks[0]);
+    let runs = shared.runs.workspace.runs.iter().rev();
+    let newest = runs.clone().next();
+    let newest = newest.map_or_else(|| "no run yet".to_owned(), |run| format!("Newest run: {}", run.name));
+    let mut pick = view.picked(shared).map(|picked| picked.run);
+    let (before, shown) = match view.picked(shared) {
+        Some(Picked { run: None, name, .. }) => (pick, format!("File: {name}")),
+        Some(Picked { name, .. }) => (pick, name.clone()),
+        None => (pick, newest.clone()),
+    };
     let width = ui.available_width();
     let label = ui.label("Decode with");
-    let combo = ComboBox::from_id_salt("live network")
-        .selected_text(&shown.1)
-        .width(width)
-        .truncate();
-    let combo = combo.show_ui(ui, |ui| {
-        for (of, text) in &picks {
-            ui.selectable_value(&mut pick, *of, text);
+    let combo = ComboBox::from_id_salt("live network").selected_text(shown).width(width);
+    let combo = combo.truncate().show_ui(ui, |ui| {
+        ui.selectable_value(&mut pick, None, newest);
+        for run in runs {
+            ui.selectable_value(&mut pick, Some(Some(run.id)), &run.name);
         }
     });
     let hint = "The network that decodes the frames: a finished run, or a network file. A replay is decoded again as soon as \
                 another one is chosen.";
     combo.response.labelled_by(label.id).on_hover_text(hint);
-    if let Some((_, file)) = view.network.network(runs) {
+    if let Some((_, file)) = view.network(shared) {
         let rows = file
             .problem
             .sensor
@@ -306,19 +257,8 @@ fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut V
     }
     ui.add_space(space(1));
     open_ui(ui, view, "Open network file…", NETWORK, effects);
-    match pick {
-        _ if pick == view.network.pick => {}
-        Pick::Run(id) => {
-            let (run, folder) = (runs.run(id).cloned(), runs.path.clone().unwrap_or_default());
-            view.load(move || {
-                let run = run.ok_or("the run was removed")?;
-                Ok(Loaded::Run(id, run.load(&folder).map_err(|error| error.to_string())?))
-            });
-        }
-        Pick::Newest | Pick::File => {
-            view.network.pick = pick;
-            view.restart(shared);
-        }
+    if pick != before {
+        view.pick(pick.flatten(), shared);
     }
 }
 

@@ -18,7 +18,7 @@ use eframe::egui::{Color32, RichText, Ui};
 use super::{
     cards,
     engine::{Command, LiveEvent, run},
-    form::{Loaded, NETWORK, NetworkChoice, Pick, SourceForm, SourceKind, form_ui},
+    form::{NETWORK, Picked, SourceForm, SourceKind, form_ui},
     snapshot::Snapshot,
     tools,
 };
@@ -36,7 +36,8 @@ pub struct LiveView {
     pub shown: Snapshot,
     /// Decoding under way. It is dropped before the job, which then ends at once.
     pub running: Option<Running>,
-    pub(super) network: NetworkChoice,
+    /// The network that decodes; `None` for the newest run.
+    picked: Option<Picked>,
     pub(super) source: SourceForm,
     /// The node under the pointer, marked on all surfaces.
     pub(super) node: Option<usize>,
@@ -46,7 +47,8 @@ pub struct LiveView {
     ended: Option<SourcePlan>,
     /// True if the window has received a snapshot and not yet reported to the thread that it was drawn.
     is_to_be_drawn: bool,
-    loading: Background<Result<Loaded, String>>,
+    /// Reads a network, and the path of the recording that it shall decode.
+    loading: Background<Result<(Picked, Option<PathBuf>), String>>,
     job: Background<LiveEvent>,
 }
 
@@ -60,13 +62,24 @@ pub struct Running {
     commands: Sender<Command>,
 }
 
+impl Running {
+    /// Returns the source in a few words.
+    pub fn source_text(&self) -> String {
+        match &self.source {
+            SourcePlan::Simulated(_) => "the simulated source".to_owned(),
+            SourcePlan::Replay(path) => format!("'{}'", path.file_name().unwrap_or_default().display()),
+            SourcePlan::Stream(source) => source.to_string(),
+        }
+    }
+}
+
 impl LiveView {
     /// Creates the view without frames; `wake` is called when there are events.
     pub fn new(wake: Wake) -> Self {
         Self {
             shown: Snapshot::default(),
             running: None,
-            network: NetworkChoice::default(),
+            picked: None,
             source: SourceForm::default(),
             node: None,
             chosen: None,
@@ -77,12 +90,38 @@ impl LiveView {
         }
     }
 
+    /// Returns the network that was picked, unless it is that of a run that was removed.
+    pub(super) fn picked(&self, shared: &Shared) -> Option<&Picked> {
+        let is_there = |picked: &&Picked| picked.run.is_none_or(|id| shared.runs.run(id).is_some());
+        self.picked.as_ref().filter(is_there)
+    }
+
+    /// Returns the network that decodes, and its name; `None` if there is none.
+    pub(super) fn network<'a>(&'a self, shared: &'a Shared) -> Option<(&'a str, &'a Arc<NetworkFile>)> {
+        let picked = self.picked(shared).map(|picked| (&*picked.name, &picked.file));
+        picked.or_else(|| shared.runs.newest().map(|run| (run.name, run.file)))
+    }
+
+    /// Decodes with the run of this number once it is read, or with the newest.
+    pub(super) fn pick(&mut self, run: Option<u64>, shared: &Shared) {
+        let Some(run) = run.and_then(|id| shared.runs.run(id)).cloned() else {
+            self.picked = None;
+            return self.restart(shared);
+        };
+        let folder = shared.runs.path.clone().unwrap_or_default();
+        self.load(move || {
+            let file = run.load(&folder).map_err(|error| error.to_string())?;
+            let (run, name) = (Some(run.id), run.name);
+            Ok((Picked { run, name, file }, None))
+        });
+    }
+
     /// Returns the name of the chosen network, and the plan for the current settings.
     ///
     /// # Errors
     /// If there is no network or a setting is missing, with what to do.
     pub(super) fn plan(&self, shared: &Shared) -> Result<(String, SessionPlan), String> {
-        let network = self.network.network(&shared.runs);
+        let network = self.network(shared);
         let (name, network) = network.ok_or("Train a network, or open a network file.")?;
         let simulation = network.problem.sensor.as_ref();
         let noise = simulation.map(|simulation| Noise {
@@ -101,7 +140,7 @@ impl LiveView {
 
     /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
     pub(super) fn has_sensor(&self, shared: &Shared) -> bool {
-        let network = self.network.network(&shared.runs);
+        let network = self.network(shared);
         network.is_none_or(|(_, file)| file.problem.sensor.is_some())
     }
 
@@ -249,7 +288,7 @@ impl LiveView {
     }
 
     /// Reads a network in the background.
-    pub(super) fn load(&mut self, read: impl FnOnce() -> Result<Loaded, String> + Send + 'static) {
+    pub(super) fn load(&mut self, read: impl FnOnce() -> Result<(Picked, Option<PathBuf>), String> + Send + 'static) {
         self.loading.start(
             move |_| read(),
             |read| read.unwrap_or_else(|error| Err(error.to_string())),
@@ -273,24 +312,9 @@ impl LiveView {
             return;
         }
         self.load(move || {
-            let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-            Ok(Loaded::File(name.into_owned(), Arc::new(file), None))
+            Ok((read_network(&path, name.into_owned())?, None))
         });
-    }
-
-    /// Decodes with a network that was read.
-    fn take_loaded(&mut self, loaded: Loaded, shared: &Shared, effects: &mut Vec<Effect>) {
-        match loaded {
-            Loaded::Run(id, file) => (self.network.pick, self.network.run) = (Pick::Run(id), Some(file)),
-            Loaded::File(name, file, sample) => {
-                (self.network.pick, self.network.file) = (Pick::File, Some((name, file)));
-                if let Some(recording) = sample {
-                    return self.replay(&recording, shared, effects);
-                }
-            }
-        }
-        self.restart(shared);
     }
 
     /// Takes an event of the thread; returns a notice for the user.
@@ -341,14 +365,9 @@ impl LiveView {
         let Some(running) = &self.running else {
             return Vec::new();
         };
-        let source = match &running.source {
-            SourcePlan::Simulated(_) => "simulated".to_owned(),
-            SourcePlan::Replay(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-            SourcePlan::Stream(source) => source.to_string(),
-        };
         let counts = &self.shown.counts;
         let rate = (counts.decoded > 0).then(|| format!("{:.0} frames per second", counts.frames_per_second));
-        std::iter::once(format!("{}, {source}", running.network))
+        std::iter::once(format!("{}, {}", running.network, running.source_text()))
             .chain(rate)
             .collect()
     }
@@ -366,7 +385,13 @@ impl View for LiveView {
         }
         self.take_chosen();
         match self.loading.next_event() {
-            Some(Ok(loaded)) => self.take_loaded(loaded, shared, effects),
+            Some(Ok((picked, recording))) => {
+                self.picked = Some(picked);
+                match recording {
+                    Some(recording) => self.replay(&recording, shared, effects),
+                    None => self.restart(shared),
+                }
+            }
             Some(Err(reason)) => effects.push(Effect::Notify(Matter::Live, Notice::Failed(reason))),
             None => {}
         }
@@ -433,8 +458,14 @@ fn folder(shared: &Shared) -> PathBuf {
     parent.map_or_else(std::env::temp_dir, PathBuf::from)
 }
 
+fn read_network(path: &Path, name: String) -> Result<Picked, String> {
+    let file = NetworkFile::load(path).map_err(|error| error.to_string())?;
+    let (run, file) = (None, Arc::new(file));
+    Ok(Picked { run, name, file })
+}
+
 /// Writes the sample recording, and the network that decodes it, to files.
-fn write_sample(folder: &Path) -> Result<Loaded, String> {
+fn write_sample(folder: &Path) -> Result<(Picked, Option<PathBuf>), String> {
     let failed = |error: &dyn std::fmt::Display| format!("the sample cannot be written: {error}");
     fs::create_dir_all(folder).map_err(|error| failed(&error))?;
     let write = |name: &str, text: &str| {
@@ -442,12 +473,11 @@ fn write_sample(folder: &Path) -> Result<Loaded, String> {
         let written = atomic_write(&path, |file| file.write_all(text.as_bytes()));
         written.map(|()| path).map_err(|error| failed(&error))
     };
-    let name = "sample network.json";
-    let network = write(name, include_str!("../../../../assets/samples/network.json"))?;
-    let recording = write(
-        "sample recording.csv",
-        include_str!("../../../../assets/samples/recording.csv"),
-    )?;
-    let network = NetworkFile::load(&network).map_err(|error| error.to_string())?;
-    Ok(Loaded::File(name.to_owned(), Arc::new(network), Some(recording)))
+    let (name, network) = (
+        "sample network.json",
+        include_str!("../../../../assets/samples/network.json"),
+    );
+    let network = read_network(&write(name, network)?, name.to_owned())?;
+    let recording = include_str!("../../../../assets/samples/recording.csv");
+    Ok((network, Some(write("sample recording.csv", recording)?)))
 }
