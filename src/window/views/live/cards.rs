@@ -13,8 +13,8 @@ use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
 
 use super::{
     LiveView,
-    snapshot::{Answered, Fact},
-    tools::{REPLAY_BAR_HEIGHT, replay_bar_ui, save_recording},
+    engine::{Answered, Fact},
+    tools::{REPLAY_BAR_HEIGHT, replay_bar_ui},
 };
 use crate::window::{
     plotting::{cells_ui, titled_plots_ui},
@@ -67,7 +67,7 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         });
         upper = surface;
     }
-    surfaces_ui(ui, upper, &answer, &mut view.node, shared.look, effects);
+    surfaces_ui(ui, upper, view, shared.look, effects);
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, &answer, shared, effects));
     });
@@ -75,14 +75,10 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
 }
 
 /// Shows the decoded surface, the actual one next to it if it is known, and their colour scale.
-fn surfaces_ui(
-    ui: &mut Ui,
-    rect: Rect,
-    answer: &Answered,
-    node: &mut Option<usize>,
-    look: Look,
-    effects: &mut Vec<Effect>,
-) {
+fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, look: Look, effects: &mut Vec<Effect>) {
+    let (Some(answer), node) = (&view.shown.answer, &mut view.node) else {
+        return;
+    };
     let figure = surface_figure(answer, *node, look);
     let gap = space(2);
     let (cards, scale) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
@@ -173,8 +169,10 @@ fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mu
     });
 }
 
-/// Button that trains a network.
+/// Buttons and heading of an empty view.
 const TRAIN: &str = "Train a network now";
+const START: &str = "Start this source";
+const HEADING: &str = "Decode live readings";
 
 /// Returns the heading and the text of an empty view, and its button.
 fn invitation(view: &LiveView, shared: &Shared) -> (String, String, Option<&'static str>) {
@@ -201,25 +199,16 @@ fn invitation(view: &LiveView, shared: &Shared) -> (String, String, Option<&'sta
         let text = format!("Live decoding needs a trained network. {text}");
         return ("No network yet".to_owned(), text, (!is_busy).then_some(TRAIN));
     };
-    let (text, button) = match view.plan(shared).map(|(_, plan)| plan.source) {
-        Err(obstacle) => (obstacle, None),
-        Ok(SourcePlan::Simulated(_)) => {
-            let text = format!(
-                "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any \
-                 hardware. To decode your own, choose a replay, a serial port or a TCP address on the left."
-            );
-            (text, Some("Start the simulated source"))
-        }
-        Ok(_) => {
-            let what = match file.problem.sensor {
-                Some(_) => "frames as they arrive",
-                None => "samples as they arrive, by the names of their columns",
-            };
-            let text = format!("The network '{name}' decodes its {what}.");
-            (text, Some("Start this source"))
-        }
+    let text = match view.plan(shared).map(|(_, plan)| plan.source) {
+        Err(obstacle) => return (HEADING.to_owned(), obstacle, None),
+        Ok(SourcePlan::Simulated(_)) => format!(
+            "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any hardware. To \
+             decode your own, choose a replay, a serial port or a TCP address on the left."
+        ),
+        Ok(_) if file.problem.sensor.is_some() => format!("The network '{name}' decodes its frames as they arrive."),
+        Ok(_) => format!("The network '{name}' decodes its samples as they arrive, by the names of their columns."),
     };
-    ("Decode live readings".to_owned(), text, button)
+    (HEADING.to_owned(), text, Some(START))
 }
 
 /// Shows the readings of an array as a map of rows and columns, with the faulty wires marked.
@@ -324,11 +313,11 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
         hint,
         &format!("{touched} of {}", in_contact.len()),
     );
-    let clear = ui.add(ghost_button("Clear zero"));
-    if clear
-        .on_hover_text("Compares readings with the model at rest again.")
-        .clicked()
-    {
+    let (clear, hint) = (
+        ghost_button("Clear zero"),
+        "Compares readings with the model at rest again.",
+    );
+    if ui.add(clear).on_hover_text(hint).clicked() {
         view.clear_zero();
     }
 }
@@ -341,18 +330,9 @@ fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
     section_heading_ui(ui, "Recording");
     let length = format!("{}, {:.1} s", counted(recorded.frames, "frame"), recorded.seconds);
     dim_ui(ui, &format!("Recorded {length}.")).on_hover_text(recorded.path.display().to_string());
-    ui.horizontal(|ui| {
-        let replay = ui.add_enabled(recorded.frames > 0, ghost_button("Replay recording"));
-        if replay
-            .on_hover_text("Replays it with the network on the left.")
-            .clicked()
-        {
-            view.replay(&recorded.path, shared, effects);
-        }
-        let task = save_recording(&recorded);
-        let save = ui.add(ghost_button("Save recording…"));
-        if save.on_hover_text(task.words.description).clicked() {
-            effects.push(Effect::ChooseFile(task));
-        }
-    });
+    let replay = ui.add_enabled(recorded.frames > 0, ghost_button("Replay recording"));
+    let hint = "Replays it with the network on the left. Export saves a copy of it.";
+    if replay.on_hover_text(hint).clicked() {
+        view.replay(&recorded.path, shared, effects);
+    }
 }

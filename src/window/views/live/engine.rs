@@ -4,15 +4,33 @@
 //! the previous one, so frames do not queue up.
 
 use std::{
-    sync::mpsc::{Receiver, RecvTimeoutError},
+    sync::{
+        Arc,
+        mpsc::{Receiver, RecvTimeoutError},
+    },
     time::{Duration, Instant},
 };
 
-use decoupler_core::job::Job;
-use decoupler_files::live::{Input, Note, Session, SessionEvent, SessionPlan};
+use decoupler_core::{
+    job::Job,
+    live::{FaultEvent, FaultyWire, ZeroGains},
+    surface::SurfaceMap,
+    text::{capitalised, counted},
+};
+use decoupler_files::{
+    export::{NetworkFile, format_number, format_percent},
+    figure::{
+        HeatMap, PlotFigure, TargetSurface, readings_figure,
+        surface::{Quantity, Surface},
+        targets_over_time_figure,
+    },
+    live::{
+        History, Input, LiveArray, Note, Recorded, ReplayState, Session, SessionEvent, SessionPlan, Tally, Watched,
+    },
+};
+use glam::DVec3;
 
-use super::snapshot::{Screen, Snapshot};
-use crate::window::job::Report;
+use crate::window::{glossary, job::Report};
 
 /// Message to the thread.
 pub enum Command {
@@ -114,4 +132,343 @@ pub fn run(
     // The last frame stays on the screen.
     show(&mut screen, &session);
     end
+}
+
+/// State of a session, ready to be drawn.
+#[derive(Clone, Debug, Default)]
+pub struct Snapshot {
+    /// The last answer; `None` before the first.
+    pub answer: Option<Arc<Answered>>,
+    /// Number of answers and their times.
+    pub counts: Tally,
+    /// The latest recording, possibly of an earlier session.
+    pub recorded: Option<Recorded>,
+    /// True while it is under way.
+    pub is_recording: bool,
+    /// Position in the replayed recording.
+    pub replay: Option<ReplayState>,
+    /// Gains of the unloaded state by which readings are divided.
+    pub zero: Option<ZeroGains>,
+}
+
+/// One answer, ready to be drawn.
+#[derive(Clone, Debug)]
+pub struct Answered {
+    /// The network, which describes the targets and may have prediction intervals.
+    pub network: Arc<NetworkFile>,
+    /// Time in its source, in seconds.
+    pub time_s: f64,
+    /// The decoded values: rows × targets.
+    pub values: Vec<f64>,
+    /// The decoded surface, and the actual one if it is known; none if the targets have no positions.
+    pub surfaces: Vec<Surface>,
+    /// Names of the nodes of the surfaces.
+    pub nodes: Arc<[String]>,
+    /// The readings of an array as drops from their values without load.
+    pub readings: Option<HeatMap>,
+    /// Rows and columns of the readings whose wires are faulty, from 0.
+    pub faulty: [Vec<usize>; 2],
+    /// The values of a network of a recording over time.
+    pub chart: Option<PlotFigure>,
+    /// All of them: of a recording, from its beginning.
+    pub history: History,
+    /// How far the answer can be trusted.
+    pub confidence: Vec<Fact>,
+    /// The present fault of the wires, and its consequence.
+    pub fault: Option<(String, String)>,
+}
+
+/// A figure with its name and meaning.
+#[derive(Clone, Debug)]
+pub struct Fact {
+    /// Name.
+    pub name: &'static str,
+    /// Meaning.
+    pub hint: String,
+    /// The figure with its unit.
+    pub value: String,
+    /// True if it is a warning.
+    pub warns: bool,
+}
+
+impl Fact {
+    /// A figure that does not warn.
+    pub fn new(name: &'static str, hint: impl Into<String>, value: impl Into<String>) -> Self {
+        Self {
+            name,
+            hint: hint.into(),
+            value: value.into(),
+            warns: false,
+        }
+    }
+}
+
+/// Makes the snapshots of a session.
+pub struct Screen {
+    /// The last one.
+    pub shown: Snapshot,
+    /// True if the session has an answer that is not displayed yet.
+    pub has_answer: bool,
+    network: Arc<NetworkFile>,
+    noise: f64,
+    nodes: Arc<[String]>,
+    surfaces: Surfaces,
+    /// Recent peak of the drops of the readings.
+    peak_percent: f64,
+}
+
+/// Returns the surfaces of the last answer.
+type Surfaces = Box<dyn Fn(&Session) -> Vec<Surface>>;
+
+impl Screen {
+    /// Prepares the surfaces of `plan`; `shown` is what was displayed before.
+    ///
+    /// # Errors
+    /// If no surface goes through the nodes of the array.
+    pub fn new(plan: &SessionPlan, shown: Snapshot) -> Result<Self, String> {
+        let problem = &plan.network.problem;
+        let (nodes, surfaces): (_, Surfaces) = match &problem.sensor {
+            Some(simulation) => {
+                let (sensor, scene) = (simulation.sensor, &simulation.scene);
+                let rows = scene.rows.read(sensor.scale.rows());
+                let rows = rows.map_err(|error| error.to_string())?;
+                let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
+                let map = SurfaceMap::shared(&x_mm, &y_mm).map_err(|error| error.to_string())?;
+                let height_mm = sensor.geometry.height_mm;
+                let range_mm = height_mm - scene.stroke_mm(&sensor.geometry)..=height_mm;
+                let per_row = sensor.scale.nodes_per_row();
+                let name = |row: &usize, node: usize| format!("Row {}, node {node}", row + 1);
+                let of_row = |row| (1..=per_row).map(move |node| name(row, node));
+                let nodes = rows.iter().flat_map(of_row).collect();
+                let surface = move |title: &str, nodes_mm: Vec<DVec3>| {
+                    Surface::through(title, &map, nodes_mm, Quantity::Height, range_mm.clone())
+                };
+                let surfaces = move |session: &Session| {
+                    let decoded = session.last.values.chunks_exact(3).map(DVec3::from_slice);
+                    let actual = session.input.truth().map(|truth| {
+                        let nodes_mm = rows.iter().flat_map(|&row| truth.row_positions_mm(&sensor, row));
+                        surface("Actual", nodes_mm.collect())
+                    });
+                    let decoded = surface("Decoded", decoded.collect());
+                    std::iter::once(decoded).chain(actual).collect()
+                };
+                (nodes, Box::new(surfaces))
+            }
+            None => match TargetSurface::new(&problem.positions, &problem.targets) {
+                Ok(surface) if !problem.positions.is_empty() => {
+                    let nodes = surface.nodes().iter();
+                    let nodes = nodes.map(|node| problem.targets[node.target].title()).collect();
+                    let surfaces = move |session: &Session| {
+                        let (values, range) = (&session.last.values, surface.range_of(&session.ranges));
+                        let [_, decoded, _] = surface.surfaces(values, values, range);
+                        vec![decoded]
+                    };
+                    (nodes, Box::new(surfaces))
+                }
+                _ => (Arc::default(), Box::new(|_| Vec::new())),
+            },
+        };
+        Ok(Self {
+            shown,
+            has_answer: false,
+            network: Arc::clone(&plan.network),
+            noise: plan.noise.relative,
+            nodes,
+            surfaces,
+            peak_percent: 0.0,
+        })
+    }
+
+    /// Returns the snapshot of now.
+    pub fn show(&mut self, session: &Session) -> Snapshot {
+        if std::mem::take(&mut self.has_answer) {
+            self.shown.answer = Some(Arc::new(self.answered(session)));
+        }
+        self.follow_recording(session);
+        self.shown.counts = session.tally.clone();
+        self.shown.zero = session.array.as_ref().and_then(|array| array.zero.clone());
+        self.shown.replay = match &session.input {
+            Input::Replay(replay) => Some(replay.state),
+            _ => None,
+        };
+        self.shown.clone()
+    }
+
+    /// Takes the length of the recording in progress, which is gone once it has ended.
+    pub fn follow_recording(&mut self, session: &Session) {
+        self.shown.is_recording = session.recording.is_some();
+        if let Some(file) = &session.recording {
+            self.shown.recorded = Some(file.recorded.clone());
+        }
+    }
+
+    fn answered(&mut self, session: &Session) -> Answered {
+        let (last, problem) = (&session.last, &self.network.problem);
+        let mut answered = Answered {
+            network: Arc::clone(&self.network),
+            time_s: last.time_s,
+            values: last.values.clone(),
+            surfaces: (self.surfaces)(session),
+            nodes: Arc::clone(&self.nodes),
+            readings: None,
+            faulty: Default::default(),
+            chart: None,
+            history: session.history.clone(),
+            confidence: Vec::new(),
+            fault: None,
+        };
+        let Some(array) = &session.array else {
+            let history = session.history.until(last.time_s);
+            let intervals = self.network.intervals.as_ref();
+            answered.chart = Some(targets_over_time_figure(&problem.targets, &history, intervals));
+            let outside = outside(session, problem.feature_count(), "target");
+            answered.confidence = vec![outside, self.drift(session)];
+            return answered;
+        };
+        let (fault, consequence) = fault(&array.watched);
+        answered.fault = consequence.map(|consequence| (fault.value.clone(), consequence));
+        if let Some(wire) = array.watched.wire() {
+            let rows = (0..array.rows.len()).filter(|&place| wire == FaultyWire::Row(array.rows[place]));
+            answered.faulty = [rows.collect(), wire.columns().collect()];
+        }
+        answered.readings = Some(self.readings(array, &last.readings));
+        answered.confidence = vec![
+            self.residual(array.residual(last)),
+            outside(session, last.readings.len(), "coordinate"),
+            fault,
+        ];
+        if session.input.truth().is_some() {
+            let hint = "Mean |error| of z over all nodes, compared with the simulated truth, over the latest frames.";
+            let error_mm = session.tally.error_mm;
+            let value = error_mm.map_or_else(|| format_number(None), |mm| format!("{} mm", format_number(mm)));
+            answered.confidence.push(Fact::new("Error", hint, value));
+        }
+        answered
+    }
+
+    /// Returns the map of the readings. Its scale follows the largest drop in round steps and falls slowly, which keeps colours
+    /// comparable from frame to frame; faulty wires do not count.
+    fn readings(&mut self, array: &LiveArray, frame_ohm: &[f64]) -> HeatMap {
+        /// Decay of the peak per frame.
+        const DECAY: f64 = 0.995;
+        let drops_percent = array.drops_percent(frame_ohm);
+        let drops = drops_percent.indexed_iter();
+        let drops = drops.filter(|((row, column), _)| !array.watched.leaves_out(array.rows[*row], *column));
+        let drops = drops.map(|(_, &drop)| drop).filter(|drop| drop.is_finite());
+        self.peak_percent = drops.fold(DECAY * self.peak_percent, f64::max);
+        readings_figure(drops_percent, &array.rows, round_up(self.peak_percent.max(0.5)))
+    }
+
+    fn residual(&self, residual: f64) -> Fact {
+        let mut value = format_percent(100.0 * residual);
+        if self.noise > 0.0 && residual.is_finite() {
+            value += &format!(" ({} × noise)", format_number(residual / self.noise));
+        }
+        let hint = format!(
+            "{}\n\nIt is as small as the noise of a reading if the answer explains the readings.",
+            glossary::RESIDUAL.hint
+        );
+        Fact::new("Residual of Eq. (2)", hint, value)
+    }
+
+    fn drift(&self, session: &Session) -> Fact {
+        const NAME: &str = "Drift of the readings";
+        let drift = match &session.monitor {
+            Ok(monitor) => monitor.drift(),
+            Err(reason) => return Fact::new(NAME, format!("Drift is not monitored: {reason}."), "not monitored"),
+        };
+        let hint = "Readings that do not look like those of the training: prediction intervals do not hold. Check the sensor \
+                    and its connection, re-zero it, or train with recent samples. The warning ends when the readings are \
+                    back to normal. In readings like those of the training, a false alarm occurs on average at most once in \
+                    10 000 blocks of readings, each at least five times as long as neighbouring readings are correlated.";
+        let inputs = &self.network.problem.inputs;
+        let value = drift.map_or_else(|| "none".to_owned(), |drift| capitalised(&drift.describe(inputs)));
+        Fact {
+            warns: drift.is_some(),
+            ..Fact::new(NAME, hint, value)
+        }
+    }
+}
+
+/// Returns how many of `of` readings, and of the targets, are outside the range seen in training.
+fn outside(session: &Session, of: usize, target: &str) -> Fact {
+    let (readings, targets) = session.outside();
+    let mut value = match readings {
+        None => "readings not known".to_owned(),
+        Some(0) if targets == 0 => "none".to_owned(),
+        Some(readings) => format!("{} of {of}", counted(readings, "reading")),
+    };
+    if targets > 0 {
+        value += &format!(", {}", counted(targets, target));
+    }
+    let hint = format!(
+        "Readings beyond the range seen in training by more than a tenth of it, and {target}s beyond by more than all of it. \
+         There the network extrapolates: check these readings, or train with samples that cover them."
+    );
+    Fact {
+        warns: readings.unwrap_or(0) + targets > 0,
+        ..Fact::new("Outside training", hint, value)
+    }
+}
+
+/// Returns the present fault of the wires, and its consequence if there is one.
+fn fault(watched: &Watched) -> (Fact, Option<String>) {
+    let unchecked = |reason: &str| {
+        let hint = format!("Faults of wires are not looked for: {reason}.");
+        (Fact::new("Fault", hint, "not looked for"), None)
+    };
+    let event = match watched {
+        Watched::NoNoise => {
+            return unchecked("without noise, deviations cannot be judged; give the noise of a reading");
+        }
+        Watched::TooLarge => return unchecked("the array is too large to check every frame"),
+        Watched::Checked(event) => event,
+    };
+    let (value, consequence) = match event {
+        FaultEvent::Recovered => ("none".to_owned(), ""),
+        FaultEvent::Named { wire, .. } => (
+            wire.to_string(),
+            ". Readings of faulty wires are left out, and the others decoded by Gauss-Newton steps on Eq. (2).",
+        ),
+        FaultEvent::Unexplained => (
+            "not a single-wire fault".to_owned(),
+            ", and no fault of a single wire explains them: the answers may be wrong. Check the wiring, the geometry, the order \
+             of the rows, and the relative noise on the left.",
+        ),
+    };
+    let warns = !consequence.is_empty();
+    let fact = Fact {
+        warns,
+        ..Fact::new("Fault", glossary::WIRE_FAULT.hint, value)
+    };
+    let consequence = format!("{}{consequence}", capitalised(&event.to_string()));
+    (fact, warns.then_some(consequence))
+}
+
+/// Returns the next 1, 2 or 5 times a power of ten.
+fn round_up(value: f64) -> f64 {
+    let decade = 10_f64.powf(value.log10().floor());
+    let steps = [1.0, 2.0, 5.0].map(|step| step * decade);
+    let step = steps.into_iter().find(|step| *step >= value * (1.0 - 1e-9));
+    step.unwrap_or(10.0 * decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_ends_at_round_numbers() {
+        for (peak, expected) in [
+            (0.5, 0.5),
+            (0.6, 1.0),
+            (1.0, 1.0),
+            (1.3, 2.0),
+            (4.9, 5.0),
+            (73.0, 100.0),
+        ] {
+            let found = round_up(peak);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{peak}: {found}");
+        }
+    }
 }

@@ -240,17 +240,12 @@ fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut V
                 another one is chosen.";
     combo.response.labelled_by(label.id).on_hover_text(hint);
     if let Some((_, file)) = view.network(shared) {
-        let rows = file
-            .problem
-            .sensor
-            .as_ref()
-            .map(|simulation| match simulation.scene.rows {
-                Rows::All => ", all rows".to_owned(),
-                Rows::Known => ", known rows".to_owned(),
-                Rows::One(row) => format!(", row {} alone", row + 1),
-            });
+        let row = match file.problem.sensor.map(|simulation| simulation.scene.rows) {
+            Some(Rows::One(row)) => format!(", row {} alone", row + 1),
+            _ => String::new(),
+        };
         let (source, hidden) = (file.source_name(), file.settings.hidden);
-        dim_ui(ui, &format!("{source}, {hidden} hidden{}", rows.unwrap_or_default()));
+        dim_ui(ui, &format!("{source}, {hidden} hidden{row}"));
         let name = if file.problem.has_nodes() { "Z error" } else { "Error" };
         let error = format_percent(file.scores.network.percent());
         dim_ui(ui, &format!("{name} on its test set {error}"));

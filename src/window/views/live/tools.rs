@@ -9,7 +9,7 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Key, Label, Layout, Modifiers, RichText, Slider, Ui, Widget, WidgetInfo};
 
-use super::{LiveView, cards::surface_figure, snapshot::Answered};
+use super::{LiveView, cards::surface_figure, engine::Answered};
 use crate::window::{
     glossary,
     shared::{Effect, FileTask, FileWords, Offers, Shared, Shown},

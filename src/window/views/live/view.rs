@@ -17,9 +17,8 @@ use eframe::egui::{Color32, RichText, Ui};
 
 use super::{
     cards,
-    engine::{Command, LiveEvent, run},
+    engine::{Command, LiveEvent, Snapshot, run},
     form::{NETWORK, Picked, SourceForm, SourceKind, form_ui},
-    snapshot::Snapshot,
     tools,
 };
 use crate::window::{
@@ -256,13 +255,9 @@ impl LiveView {
     pub(super) fn record(&self, shared: &Shared) {
         let (folder, begins) = (folder(shared).join("recordings"), !self.is_recording());
         self.change(move |session| {
-            session.recording = match &session.array {
-                Some(array) if begins => {
-                    let columns = array.sensor.scale.columns();
-                    Some(RecordingFile::create(&folder, &array.rows, columns)?)
-                }
-                _ => None,
-            };
+            let array = session.array.as_ref().filter(|_| begins);
+            let file = array.map(|array| RecordingFile::create(&folder, &array.rows, array.sensor.scale.columns()));
+            session.recording = file.transpose()?;
             Ok(())
         });
     }
@@ -317,27 +312,6 @@ impl LiveView {
         });
     }
 
-    /// Takes an event of the thread; returns a notice for the user.
-    fn take(&mut self, event: LiveEvent) -> Option<Notice> {
-        match event {
-            LiveEvent::Shown(shown) => {
-                self.shown = *shown;
-                self.is_to_be_drawn = true;
-                None
-            }
-            LiveEvent::Failed(reason) => Some(Notice::Failed(reason)),
-            LiveEvent::Ended(end) => {
-                let running = self.running.take()?;
-                let is_stream = self.shown.replay.is_none() && !matches!(running.source, SourcePlan::Simulated(_));
-                self.ended = is_stream.then_some(running.source);
-                Some(match end {
-                    Err(reason) => Notice::Failed(reason),
-                    Ok(()) => Notice::Done("The source has ended.".to_owned()),
-                })
-            }
-        }
-    }
-
     /// Returns the state of the stream, with its colour.
     fn status(&self, palette: &Palette) -> (Color32, String) {
         let counts = &self.shown.counts;
@@ -379,20 +353,35 @@ impl View for LiveView {
     }
 
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        let notify = |notice| Effect::Notify(Matter::Live, notice);
         while let Some(event) = self.job.next_event() {
-            let notice = self.take(event);
-            effects.extend(notice.map(|notice| Effect::Notify(Matter::Live, notice)));
+            match event {
+                LiveEvent::Shown(shown) => (self.shown, self.is_to_be_drawn) = (*shown, true),
+                LiveEvent::Failed(reason) => effects.push(notify(Notice::Failed(reason))),
+                LiveEvent::Ended(end) => {
+                    let Some(Running { source, .. }) = self.running.take() else {
+                        continue;
+                    };
+                    let is_stream = self.shown.replay.is_none() && !matches!(source, SourcePlan::Simulated(_));
+                    self.ended = is_stream.then_some(source);
+                    effects.push(notify(match end {
+                        Err(reason) => Notice::Failed(reason),
+                        Ok(()) => Notice::Done("The source has ended.".to_owned()),
+                    }));
+                }
+            }
         }
         self.take_chosen();
         match self.loading.next_event() {
-            Some(Ok((picked, recording))) => {
+            Some(Ok((picked, None))) => {
                 self.picked = Some(picked);
-                match recording {
-                    Some(recording) => self.replay(&recording, shared, effects),
-                    None => self.restart(shared),
-                }
+                self.restart(shared);
             }
-            Some(Err(reason)) => effects.push(Effect::Notify(Matter::Live, Notice::Failed(reason))),
+            Some(Ok((picked, Some(recording)))) => {
+                self.picked = Some(picked);
+                self.replay(&recording, shared, effects);
+            }
+            Some(Err(reason)) => effects.push(notify(Notice::Failed(reason))),
             None => {}
         }
     }
