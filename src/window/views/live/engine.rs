@@ -413,36 +413,26 @@ fn outside(session: &Session, of: usize, target: &str) -> Fact {
 
 /// Returns the present fault of the wires, and its consequence if there is one.
 fn fault(watched: &Watched) -> (Fact, Option<String>) {
-    let unchecked = |reason: &str| {
-        let hint = format!("Faults of wires are not looked for: {reason}.");
-        (Fact::new("Fault", hint, "not looked for"), None)
-    };
-    let event = match watched {
-        Watched::NoNoise => {
-            return unchecked("without noise, deviations cannot be judged; give the noise of a reading");
+    let (value, consequence) = match watched {
+        Watched::NoNoise | Watched::TooLarge => ("not looked for".to_owned(), None),
+        Watched::Checked(FaultEvent::Recovered) => ("none".to_owned(), None),
+        Watched::Checked(event @ FaultEvent::Named { wire, .. }) => {
+            let after = "Its readings are left out, and the others decoded by Gauss-Newton steps on Eq. (2).";
+            (wire.to_string(), Some(format!("{event}. {after}")))
         }
-        Watched::TooLarge => return unchecked("the array is too large to check every frame"),
-        Watched::Checked(event) => event,
+        Watched::Checked(event @ FaultEvent::Unexplained) => {
+            let after = "and no fault of a single wire explains them: the answers may be wrong. Check the wiring, the geometry, \
+                         the order of the rows, and the relative noise on the left.";
+            ("not a single-wire fault".to_owned(), Some(format!("{event}, {after}")))
+        }
     };
-    let (value, consequence) = match event {
-        FaultEvent::Recovered => ("none".to_owned(), ""),
-        FaultEvent::Named { wire, .. } => (
-            wire.to_string(),
-            ". Readings of faulty wires are left out, and the others decoded by Gauss-Newton steps on Eq. (2).",
-        ),
-        FaultEvent::Unexplained => (
-            "not a single-wire fault".to_owned(),
-            ", and no fault of a single wire explains them: the answers may be wrong. Check the wiring, the geometry, the order \
-             of the rows, and the relative noise on the left.",
-        ),
-    };
-    let warns = !consequence.is_empty();
+    let hint = glossary::WIRE_FAULT.hint;
+    let hint = format!("{hint} Looked for if the noise of a reading is known and the array not too large.");
     let fact = Fact {
-        warns,
-        ..Fact::new("Fault", glossary::WIRE_FAULT.hint, value)
+        warns: consequence.is_some(),
+        ..Fact::new("Fault", hint, value)
     };
-    let consequence = format!("{}{consequence}", capitalised(&event.to_string()));
-    (fact, warns.then_some(consequence))
+    (fact, consequence.map(|text| capitalised(&text)))
 }
 
 /// Returns the next 1, 2 or 5 times a power of ten.

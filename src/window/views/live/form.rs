@@ -140,10 +140,8 @@ impl SourceForm {
     fn noise_ui(&mut self, ui: &mut Ui, simulation: &Simulation) {
         let hint = "Noise of a reading, simulated or of your device, relative to the reading (standard deviation). Fault and \
                     contact detection use it: too small a value causes false alarms.";
-        let before = self.noise(simulation);
-        let mut noise = before;
-        quantity_ui(ui, "Relative noise", hint, &mut noise, 0.0..=1.0, "");
-        if noise != before {
+        let mut noise = self.noise(simulation);
+        if quantity_ui(ui, "Relative noise", hint, &mut noise, 0.0..=1.0, "").changed() {
             self.noise = Some(noise);
         }
     }

@@ -1,6 +1,6 @@
 //! The tools: buttons, keys and names of the actions, the replay bar, and the exports.
 
-use std::{fs::File, io, sync::Arc};
+use std::{fs::File, io, ops::RangeInclusive, sync::Arc};
 
 use decoupler_core::problem::Channel;
 use decoupler_files::{
@@ -151,43 +151,44 @@ pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects:
             ui.disable();
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            speed_ui(ui, view);
+            let text = RichText::new(format!("{:.1}×", view.source.speed)).size(type_size().note);
+            ui.add_sized([space(8), space(6)], Label::new(text));
+            if bar_slider_ui(ui, "Replay speed", (&mut view.source.speed, 1.0), 0.1..=10.0, space(24)) {
+                view.steer();
+            }
+            dim_ui(ui, "Speed");
             ui.add_space(space(2));
             let text = format!("{:.2} of {:.2} s", replay.at_s, replay.length_s);
             ui.label(RichText::new(text).size(type_size().note));
             let mut at_s = replay.at_s;
-            let slider = Slider::new(&mut at_s, 0.0..=replay.length_s.max(f64::MIN_POSITIVE));
-            let width = ui.available_width() - space(2);
-            let slider = slider_ui(ui, slider, width);
-            slider.widget_info(|| WidgetInfo::slider(is_running, replay.at_s, "Replay position"));
-            if slider.double_clicked() {
-                at_s = 0.0;
-            }
-            if at_s != replay.at_s {
+            let (range, width) = (
+                0.0..=replay.length_s.max(f64::MIN_POSITIVE),
+                ui.available_width() - space(2),
+            );
+            if bar_slider_ui(ui, "Replay position", (&mut at_s, 0.0), range, width) {
                 view.control(move |control, now| control.seek(at_s, now));
             }
         });
     });
 }
 
-fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
-    let before = view.source.speed;
-    let mut speed = before;
-    let text = RichText::new(format!("{before:.1}×")).size(type_size().note);
-    let text = text.color(Theme::of(ui).palette.text);
-    ui.add_sized([space(8), space(6)], Label::new(text));
-    let slider = Slider::new(&mut speed, 0.1..=10.0).logarithmic(true);
-    let slider = slider_ui(ui, slider, space(24));
+/// Shows a slider that a double click resets to `usual`; returns true if its value has changed.
+fn bar_slider_ui(
+    ui: &mut Ui,
+    name: &str,
+    (value, usual): (&mut f64, f64),
+    range: RangeInclusive<f64>,
+    width: f32,
+) -> bool {
+    let before = *value;
+    let is_logarithmic = *range.start() > 0.0;
+    let slider = slider_ui(ui, Slider::new(value, range).logarithmic(is_logarithmic), width);
     if slider.double_clicked() {
-        speed = 1.0;
+        *value = usual;
     }
-    slider.widget_info(|| WidgetInfo::slider(true, before, "Replay speed"));
-    slider.on_hover_text("Recorded seconds per second, from 0.1 to 10. A double click sets it to 1.");
-    if speed != before {
-        view.source.speed = speed;
-        view.steer();
-    }
-    dim_ui(ui, "Speed");
+    slider.widget_info(|| WidgetInfo::slider(ui.is_enabled(), before, name));
+    slider.on_hover_text("A double click resets it.");
+    *value != before
 }
 
 /// Returns what the view shows: the surfaces, the readings and their recording, or the values over time.
