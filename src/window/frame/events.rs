@@ -2,12 +2,13 @@ use super::{
     DecouplerWindow,
     applying::{have_same_sets, have_same_test_set, is_of_test_set},
     files::{Answer, ToWrite, Written},
+    modal::Modal,
     save_form::{Saving, Tried},
 };
 use crate::window::{
     job::JobError,
     preview::PreviewEvent,
-    shared::{Matter, Notice, Phase, Preview, RunView},
+    shared::{Matter, Notice, Phase, Preview, RunView, ViewKind},
     training_worker::{Began, Event},
 };
 use decoupler_core::evaluation::RunSettings;
@@ -37,9 +38,10 @@ impl DecouplerWindow {
         }
         let mut effects = Vec::new();
         let mut working = Vec::new();
-        for view in self.views.all() {
+        for kind in ViewKind::ALL {
+            let view = self.views.get(kind);
             view.take_events(&self.shared, &mut effects);
-            working.extend(view.is_working().then(|| view.name()));
+            working.extend(view.holdings(&self.shared).is_computing.then_some(kind));
         }
         self.shared.working = working;
         self.apply_all(effects);
@@ -63,12 +65,11 @@ impl DecouplerWindow {
             Written::InUse(reason) if asks => Tried::Refused(reason),
             Written::InUse(reason) | Written::Failed(reason) => {
                 // The user must see this.
-                self.closing = None;
+                self.modal.take_if(|modal| matches!(modal, Modal::Closing(_)));
                 return self.notices.fail(Matter::File, reason);
             }
         };
-        self.closing = None;
-        self.saving = Some(Saving::new(task, path.display().to_string(), Some(tried)));
+        self.modal = Some(Modal::Path(Saving::new(task, path.display().to_string(), Some(tried))));
     }
 
     pub(super) fn take_preview(&mut self, event: PreviewEvent) {
@@ -109,8 +110,16 @@ impl DecouplerWindow {
             ..RunView::new(began)
         });
         self.take_setup(&setup);
+        self.share_plan();
         self.typed = None;
         self.shared.phase = phase;
+    }
+
+    /// Shares the plan on the left with the training, if they have the same.
+    pub(super) fn share_plan(&mut self) {
+        if let Some(run) = &mut self.shared.run {
+            run.share_plan(&self.shared.recording);
+        }
     }
 
     fn take_event(&mut self, event: Event) {
@@ -124,7 +133,8 @@ impl DecouplerWindow {
         match event {
             Event::Began(Ok(began)) => {
                 shared.preview = None;
-                shared.run = Some(RunView::new(*began));
+                let run = shared.run.insert(RunView::new(*began));
+                run.share_plan(&shared.recording);
                 shared.phase = Phase::Training;
             }
             Event::Began(Err(error)) => self.refuse(Matter::Settings, error.to_string()),

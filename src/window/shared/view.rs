@@ -1,6 +1,6 @@
 //! The interface of all views, and the shared state of their surfaces: mode, camera, colours, and the marked node.
 
-use std::{fmt::Debug, path::PathBuf};
+use std::fmt::Debug;
 
 use decoupler_core::problem::Channel;
 use decoupler_files::{
@@ -11,86 +11,110 @@ use decoupler_files::{
     },
 };
 use eframe::egui::{
-    Align, Button, ComboBox, Context, CursorIcon, Layout, Mesh, Popup, Rect, RichText, Sense, Ui, UiBuilder, Vec2,
+    Align, Button, ComboBox, CursorIcon, Key, Layout, Mesh, Popup, Rect, RichText, Sense, Ui, UiBuilder, Vec2,
     WidgetInfo, accesskit::Role, pos2, vec2,
 };
 
-use super::{Effect, FileInUse, Offers, Shared, Shown, Unfinished, training_status_ui};
+use super::{Effect, FileInUse, Offers, Shared, Shown};
 use crate::window::{
     surface_view::{ColourBar, SurfaceViewResponse},
     test_view::{HeightScale, SurfaceStyle},
     theme::{Theme, rgb, space, type_size},
-    widgets::{section_heading_ui, segmented_ui},
+    widgets::{section_heading_ui, segmented_ui, state_ui, status_progress_ui},
 };
 
 /// One of the views. It owns its private state and the handles of its threads, reads the shared state, and requests
 /// everything else from the window.
 pub trait View: Debug {
-    /// Returns its name in the top bar.
-    fn name(&self) -> &'static str;
-
-    /// Called when the view is displayed.
-    fn enter(&mut self, _shared: &Shared) {}
-
     /// Takes the events of its threads and follows the shared state, even while another view is displayed.
     fn take_events(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Returns true while its threads compute.
-    fn is_working(&self) -> bool {
-        false
+    /// Handles keys and the pointer before anything is drawn: offers its commands, and carries out those that the user
+    /// asked for.
+    fn take_commands(&mut self, _offers: &mut Offers<'_>, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Returns its work and its files, which closing the window would cut short or another file must not overwrite.
+    fn holdings(&self, _shared: &Shared) -> Holdings {
+        Holdings::default()
     }
-
-    /// Takes files dropped on the window; false if they are not for it.
-    fn take_files(&mut self, _paths: &[PathBuf], _shared: &Shared, _effects: &mut Vec<Effect>) -> bool {
-        false
-    }
-
-    /// Returns the work that closing the window would cut short or discard, including work being prepared.
-    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
-        Vec::new()
-    }
-
-    /// Returns the files in use, which must not be overwritten.
-    fn files_in_use(&self) -> Vec<FileInUse> {
-        Vec::new()
-    }
-
-    /// Offers its actions, and carries out the ones that the user asked for.
-    fn offer_actions(&mut self, _offers: &mut Offers<'_>, _shared: &Shared, _effects: &mut Vec<Effect>) {}
-
-    /// Handles the pointer before anything is drawn, so that the whole window shows the effect in the same frame.
-    fn take_pointer(&mut self, _ctx: &Context, _shared: &Shared) {}
-
-    /// Returns the columns of a window of this width in points.
-    fn columns(&self, _window_width: f32) -> Columns {
-        Columns {
-            form_width: space(68),
-            has_report: false,
-        }
-    }
-
-    /// Shows its tools at the right of the top bar, from right to left.
-    fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Returns what it shows and the user can export, or the reasons why that is not available now.
     fn shown<'a>(&'a self, _shared: &'a Shared) -> Vec<Shown<'a>> {
         Vec::new()
     }
 
+    /// Shows its tools at the right of the top bar, from right to left.
+    fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
     /// Shows its column on the left.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
-    /// Shows its column on the right, where [`Self::columns`] has one.
+    /// Shows its column on the right, where [`ViewKind::columns`] has one.
     fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Shows its middle.
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
+    /// Shows its middle. Returns the status line at the bottom, or `None` for that of the training.
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status>;
+}
 
-    /// Shows the status line at the bottom: that of the training, unless the view has one of its own.
-    fn status_ui(&self, ui: &mut Ui, shared: &Shared) {
-        training_status_ui(ui, shared);
+/// The views, in the order of the top bar.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ViewKind {
+    /// One training and the sensor that it decodes.
+    #[default]
+    Train,
+    /// The paper's tables and sweeps.
+    Study,
+    /// Two finished trainings side by side.
+    Compare,
+    /// What the readings determine.
+    Sensor,
+    /// Speed and accuracy of each decoder.
+    TradeOff,
+    /// Frames decoded as they arrive.
+    Live,
+}
+
+impl ViewKind {
+    /// All views.
+    pub const ALL: [Self; 6] = [
+        Self::Train,
+        Self::Study,
+        Self::Compare,
+        Self::Sensor,
+        Self::TradeOff,
+        Self::Live,
+    ];
+
+    /// Returns its name in the top bar.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Train => "Train",
+            Self::Study => "Experiments",
+            Self::Compare => "Compare",
+            Self::Sensor => "Identifiability",
+            Self::TradeOff => "Trade-off",
+            Self::Live => "Live",
+        }
+    }
+
+    /// Returns the key that shows it, with Ctrl.
+    pub fn key(self) -> Key {
+        const KEYS: [Key; 6] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6];
+        KEYS[self as usize]
+    }
+
+    /// Returns its columns in a window of this width in points.
+    pub fn columns(self, window_width: f32) -> Columns {
+        let is_narrow = window_width < MIN_WIDTH_FOR_REPORT;
+        Columns {
+            form_width: space(if self == Self::Train && is_narrow { 62 } else { 68 }),
+            has_report: self == Self::Train && !is_narrow,
+        }
     }
 }
+
+/// Width of a window, in points, from which a column on the right leaves the middle enough room.
+pub const MIN_WIDTH_FOR_REPORT: f32 = 1400.0;
 
 /// The columns next to the middle of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,6 +123,101 @@ pub struct Columns {
     pub form_width: f32,
     /// True if there is a column on the right.
     pub has_report: bool,
+}
+
+/// What a view is doing, as the line at the bottom tells it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Status {
+    /// Colour of the dot before the text.
+    pub tone: Tone,
+    /// The state in a few words.
+    pub text: String,
+    /// Figures and remarks, in dim text.
+    pub notes: Vec<String>,
+    /// Name of the work, and its share that is done.
+    pub progress: Option<(&'static str, f32)>,
+}
+
+impl Status {
+    /// A state without figures.
+    pub fn new(tone: Tone, text: impl Into<String>) -> Self {
+        Self {
+            tone,
+            text: text.into(),
+            notes: Vec::new(),
+            progress: None,
+        }
+    }
+
+    /// Adds a remark in dim text.
+    #[must_use]
+    pub fn with_note(mut self, note: impl Into<String>) -> Self {
+        self.notes.push(note.into());
+        self
+    }
+
+    /// Shows it in the line at the bottom.
+    pub fn show(&self, ui: &mut Ui) {
+        let palette = Theme::of(ui).palette;
+        let colour = match self.tone {
+            Tone::Calm => palette.dim,
+            Tone::Busy => palette.accent,
+            Tone::Good => palette.good,
+            Tone::Warning => palette.warning,
+            Tone::Bad => palette.bad,
+        };
+        ui.horizontal_centered(|ui| {
+            state_ui(ui, colour, &self.text);
+            for note in &self.notes {
+                ui.label(RichText::new(note).size(type_size().note).color(palette.dim));
+            }
+            if let Some((name, share)) = self.progress {
+                status_progress_ui(ui, name, share);
+            }
+        });
+    }
+}
+
+/// Colour of a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// Nothing happens.
+    Calm,
+    /// Work is under way.
+    Busy,
+    /// Work has ended well.
+    Good,
+    /// Work has ended early.
+    Warning,
+    /// Work has failed.
+    Bad,
+}
+
+/// Work and files of a view.
+#[derive(Debug, Default)]
+pub struct Holdings {
+    /// True while its threads compute.
+    pub is_computing: bool,
+    /// Work that closing the window would cut short, or whose result it would discard.
+    pub unfinished: Vec<Unfinished>,
+    /// Files in use, which must not be overwritten.
+    pub files: Vec<FileInUse>,
+}
+
+/// Work that closing the window would cut short, or whose result it would discard.
+#[derive(Debug)]
+pub struct Unfinished {
+    /// Name that distinguishes the work from other work of the same view: "Training".
+    pub work: &'static str,
+    /// Its progress: "epoch 12 of 1000".
+    pub progress: String,
+}
+
+impl Unfinished {
+    /// Work with its progress.
+    pub fn new(work: &'static str, progress: String) -> Self {
+        Self { work, progress }
+    }
 }
 
 /// Camera, mode and colours in which all views draw surfaces.

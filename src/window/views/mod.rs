@@ -1,8 +1,7 @@
 //! The views, one module each; they do not depend on each other.
 //!
-//! A new view is a module whose main type implements [`View`], with a field and a line in [`Views`] below. It requests
-//! changes to the window as an [`Effect`](crate::window::shared::Effect); a new kind of request needs a variant in
-//! `shared/effect.rs` and its implementation in `window/applying.rs`.
+//! A new view is a module whose main type implements [`View`], with a [`ViewKind`] and a field and a line in [`Views`]
+//! below. It requests changes to the window as an [`Effect`](crate::window::shared::Effect), which the frame applies.
 
 mod compare;
 mod experiments;
@@ -13,7 +12,10 @@ mod train;
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{job::Wake, shared::View};
+use super::{
+    job::Wake,
+    shared::{View, ViewKind},
+};
 use decoupler_files::import::Plan;
 
 pub use identifiability::{Analysis, Question};
@@ -71,15 +73,20 @@ impl Views {
         !self.train.recording.is_empty()
     }
 
-    /// Returns the views in the order of the top bar; the first is the Train view.
-    pub fn all(&mut self) -> [&mut dyn View; 6] {
-        [
-            &mut self.train,
-            &mut self.experiments,
-            &mut self.compare,
-            &mut self.identifiability,
-            &mut self.trade_off,
-            &mut self.live,
-        ]
+    /// Opens dropped files in the Train view.
+    pub fn open_files(&mut self, paths: Vec<PathBuf>) {
+        self.train.recording.open(paths);
+    }
+
+    /// Returns a view.
+    pub fn get(&mut self, view: ViewKind) -> &mut dyn View {
+        match view {
+            ViewKind::Train => &mut self.train,
+            ViewKind::Study => &mut self.experiments,
+            ViewKind::Compare => &mut self.compare,
+            ViewKind::Sensor => &mut self.identifiability,
+            ViewKind::TradeOff => &mut self.trade_off,
+            ViewKind::Live => &mut self.live,
+        }
     }
 }

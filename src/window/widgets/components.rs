@@ -3,9 +3,9 @@
 //! Parts shared by all fields: the reason why typed text was refused, and the menu of a value.
 
 use eframe::egui::{
-    self, Align, Button, CollapsingHeader, Color32, Context, DragValue, FontId, Frame, Id, Key, KeyboardShortcut,
-    Label, Layout, Margin, Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui,
-    UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
+    self, Align, Button, CollapsingHeader, Color32, DragValue, FontId, Frame, Id, Key, KeyboardShortcut, Label, Layout,
+    Margin, Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, UiBuilder,
+    Vec2, Widget, WidgetInfo, WidgetText,
     accesskit::{Invalid, Role},
     vec2,
 };
@@ -370,40 +370,6 @@ pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, col
             response.on_hover_text(meaning);
         });
     });
-}
-
-/// Place in the window that the tour points at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Landmark {
-    /// Actual surface.
-    ActualSurface,
-    /// Array scale, hidden nodes and method.
-    Choices,
-    /// Button that starts a training.
-    Train,
-    /// Error table.
-    Errors,
-    /// Button of the Export menu.
-    Export,
-}
-
-impl Landmark {
-    fn id(self) -> Id {
-        Id::unique(("landmark", self))
-    }
-
-    /// Records where the landmark is drawn in this frame.
-    pub fn stands_at(self, ui: &Ui, rect: Rect) {
-        let seen = rect.intersect(ui.clip_rect());
-        let frame = ui.ctx().cumulative_frame_nr();
-        ui.data_mut(|data| data.insert_temp(self.id(), (frame, seen)));
-    }
-
-    /// Returns where the landmark is drawn in this frame; `None` if it is not in view.
-    pub fn place(self, ctx: &Context) -> Option<Rect> {
-        let (frame, rect) = ctx.data(|data| data.get_temp::<(u64, Rect)>(self.id()))?;
-        (frame == ctx.cumulative_frame_nr() && rect.is_positive()).then_some(rect)
-    }
 }
 
 /// Draws a focus ring around a widget that does not show the focus otherwise.

@@ -26,8 +26,8 @@ use super::{
 use crate::window::{
     plotting::{Pointer, plots_ui, titled_plots_ui},
     shared::{
-        Effect, LoadedRun, Look, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, View, colour_scale_ui,
-        follow_surface, target_choice_ui, view_mode_ui,
+        Effect, LoadedRun, Look, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, Status, View, ViewKind,
+        colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui,
     },
     surface_view::{ColourBar, SurfaceView},
     test_view::TestSet,
@@ -40,15 +40,10 @@ use crate::window::{
 };
 
 impl View for CompareView {
-    fn name(&self) -> &'static str {
-        "Compare"
-    }
-
-    fn enter(&mut self, _shared: &Shared) {
-        self.opened_with = Some(0);
-    }
-
     fn take_events(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
+        if shared.shown != ViewKind::Compare {
+            self.opened_with = Some(0);
+        }
         self.follow(&shared.runs);
     }
 
@@ -68,7 +63,7 @@ impl View for CompareView {
     }
 
     /// Shows the surfaces of both runs above, their curves and figures below.
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         let whole = ui.available_rect_before_wrap();
         let gap = space(2);
         let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));
@@ -102,6 +97,7 @@ impl View for CompareView {
             });
         });
         ui.allocate_rect(whole, Sense::hover());
+        None
     }
 }
 

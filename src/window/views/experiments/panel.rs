@@ -26,13 +26,13 @@ use super::{
     sweep_folder::folder_form_ui,
 };
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Shared, Shown},
-    theme::{Theme, space},
+    shared::{Effect, FileTask, FileWords, Shared, Shown, Status, Tone},
+    theme::space,
     widgets::{
         dim_ui,
         fields::{count_ui, seed_ui},
         ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui,
-        state_ui, with_shortcut,
+        with_shortcut,
     },
 };
 
@@ -267,17 +267,15 @@ fn progress_ui(ui: &mut Ui, running: &Running) {
 }
 
 /// Shows the state of the experiment in the line at the bottom.
-pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
-    let palette = Theme::of(ui).palette;
+pub fn status(experiments: &ExperimentsView) -> Status {
     let folder = experiments.shown_folder().filter(|_| experiments.running.is_none());
     let of_folder = folder.and_then(|folder| Some((folder.name(), folder.trials()?)));
     if let Some((name, finished)) = of_folder {
         let text = format!("Sweep folder {name}: {} finished", counted(finished, "trial"));
-        ui.horizontal_centered(|ui| state_ui(ui, palette.good, &text));
-        return;
+        return Status::new(Tone::Good, text);
     }
-    let (colour, text) = match (&experiments.running, experiments.outcome()) {
-        (Some(running), _) => (palette.accent, format!("Running {}", running.topic.name())),
+    let (tone, text) = match (&experiments.running, experiments.outcome()) {
+        (Some(running), _) => (Tone::Busy, format!("Running {}", running.topic.name())),
         (None, Some(outcome)) => {
             let (done, all) = outcome.trials();
             let took = outcome
@@ -285,16 +283,16 @@ pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
                 .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
             let name = experiments.topic.name();
             match outcome.ending {
-                Some(Ending::Complete) => (palette.good, format!("{name} finished: {all} trials{took}")),
+                Some(Ending::Complete) => (Tone::Good, format!("{name} finished: {all} trials{took}")),
                 _ => (
-                    palette.warning,
+                    Tone::Warning,
                     format!("{name} ended early: {done} of {all} trials{took}"),
                 ),
             }
         }
-        (None, None) => (palette.dim, "Ready: press Run".to_owned()),
+        (None, None) => (Tone::Calm, "Ready: press Run".to_owned()),
     };
-    ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
+    Status::new(tone, text)
 }
 
 /// Opens a cell in the Train view: its settings with the seed of its median trial, and the network of that trial. A

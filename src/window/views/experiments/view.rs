@@ -9,7 +9,7 @@ use decoupler_files::{
     },
     figure::{Figure, HeatMap},
 };
-use eframe::egui::{Align, FontId, Key, Label, Layout, Modifiers, RichText, Sense, Ui, Vec2, vec2};
+use eframe::egui::{Align, FontId, Label, Layout, RichText, Sense, Ui, Vec2, vec2};
 
 use super::{
     ExperimentLook, ExperimentsView, Outcome, Topic,
@@ -19,7 +19,7 @@ use super::{
 };
 use crate::window::{
     plotting::{CellPointed, Pointer, heat_map_ui, plots_ui},
-    shared::{Effect, Matter, Notice, Offers, Shared, Shown, Unfinished, View},
+    shared::{Command, Effect, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Unfinished, View},
     theme::{Theme, semibold, space, type_size},
     widgets::{
         ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, card_ui, ghost_button, invitation_ui,
@@ -28,10 +28,6 @@ use crate::window::{
 };
 
 impl View for ExperimentsView {
-    fn name(&self) -> &'static str {
-        "Experiments"
-    }
-
     fn take_events(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         let mut finished = Vec::new();
         while let Some(event) = self.job.next_event() {
@@ -55,34 +51,29 @@ impl View for ExperimentsView {
         self.folder.take_events();
     }
 
-    fn is_working(&self) -> bool {
-        self.running.is_some()
-    }
-
-    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+    fn holdings(&self, _shared: &Shared) -> Holdings {
         let running = self.running.iter();
         let unfinished = running.map(|running| {
             let (name, done) = (running.topic.name(), running.done);
             let progress = format!("{name}, {done} of {} finished", counted(running.trials, "trial"));
-            Unfinished::discarded("Experiment", progress)
+            Unfinished::new("Experiment", progress)
         });
         let unsaved = self.unsaved().map(|(topic, trials)| {
             let progress = format!("{} finished, not exported as a table", counted(trials, "trial"));
-            Unfinished::discarded(topic.name(), progress)
+            Unfinished::new(topic.name(), progress)
         });
-        unfinished.chain(unsaved).collect()
+        Holdings {
+            is_computing: self.running.is_some(),
+            unfinished: unfinished.chain(unsaved).collect(),
+            files: Vec::new(),
+        }
     }
 
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {
-        if offers.offer_keys("Run experiment", Modifiers::COMMAND, Key::Enter, self.can_run()) {
+    fn take_commands(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.offer(Command::Begin("Run experiment"), self.can_run()) {
             self.run(effects);
         }
-        if offers.offer_keys(
-            "Cancel experiment",
-            Modifiers::COMMAND,
-            Key::Period,
-            self.running.is_some(),
-        ) {
+        if offers.offer(Command::Cancel("Cancel experiment"), self.running.is_some()) {
             self.cancel();
         }
     }
@@ -96,7 +87,14 @@ impl View for ExperimentsView {
     }
 
     /// Shows the table above, figure and remarks below.
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
+        self.results_ui(ui, shared, effects);
+        Some(panel::status(self))
+    }
+}
+
+impl ExperimentsView {
+    fn results_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let whole = ui.available_rect_before_wrap();
         if self.shown_folder().is_some() {
             card_ui(ui, whole, |ui| folder_card_ui(ui, &mut self.folder));
@@ -144,10 +142,6 @@ impl View for ExperimentsView {
         if is_wanted {
             self.run(effects);
         }
-    }
-
-    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        panel::status_ui(ui, self);
     }
 }
 

@@ -16,13 +16,12 @@ use super::{Analysis, IdentifiabilityView};
 use crate::window::{
     glossary,
     plotting::titled_plots_ui,
-    shared::{Effect, Look, Shared, Shown, colour_scale_ui, follow_surface, view_mode_ui},
+    shared::{Effect, Look, Shared, Shown, Status, Tone, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
     test_view::Frame,
     theme::{Theme, semibold, space, type_size},
     widgets::{
         card_ui, fact_ui, fields::capitalised, note_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui,
-        state_ui,
     },
 };
 
@@ -205,29 +204,32 @@ pub(super) fn shown<'a>(view: &'a IdentifiabilityView, shared: &'a Shared) -> Ve
 }
 
 /// Shows the state of the analysis in the line at the bottom.
-pub(super) fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
-    let palette = Theme::of(ui).palette;
-    let (colour, text) = match (&shown.problem, &shown.analysis) {
-        _ if shown.is_pending => (palette.accent, "Computing".to_owned()),
+pub(super) fn status(shown: &IdentifiabilityView) -> Status {
+    let (tone, text) = match (&shown.problem, &shown.analysis) {
+        _ if shown.is_pending => (Tone::Busy, "Computing".to_owned()),
         (Some(_), _) => (
-            palette.bad,
+            Tone::Bad,
             "This sensor or scene is not possible: the note says why".to_owned(),
         ),
         (None, Some(analysis)) => match analysis.warnings.len() {
-            0 => (palette.good, "No warnings: nothing prevents decoupling".to_owned()),
-            1 => (palette.warning, "1 warning".to_owned()),
-            count => (palette.warning, format!("{count} warnings")),
+            0 => (Tone::Good, "No warnings: nothing prevents decoupling".to_owned()),
+            1 => (Tone::Warning, "1 warning".to_owned()),
+            count => (Tone::Warning, format!("{count} warnings")),
         },
-        (None, None) => (palette.dim, "Nothing computed yet".to_owned()),
+        (None, None) => (Tone::Calm, "Nothing computed yet".to_owned()),
     };
-    ui.horizontal_centered(|ui| {
-        state_ui(ui, colour, &text);
-        if let Some(analysis) = &shown.analysis {
+    let status = Status::new(tone, text);
+    match &shown.analysis {
+        Some(analysis) => {
             let sensor = &analysis.question.sensor;
-            let text = format!("{}, {} read", sensor.scale, counted(analysis.rows.len(), "row"));
-            ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+            status.with_note(format!(
+                "{}, {} read",
+                sensor.scale,
+                counted(analysis.rows.len(), "row")
+            ))
         }
-    });
+        None => status,
+    }
 }
 
 /// Shows warnings with what to change, then the figures.

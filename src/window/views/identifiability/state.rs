@@ -27,6 +27,8 @@ pub struct IdentifiabilityView {
     pub problem: Option<String>,
     /// True while the answer is being computed.
     pub is_pending: bool,
+    /// True while the view is displayed.
+    pub(super) is_shown: bool,
     /// Axis along which pattern and sensitivity are drawn: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
     /// Settings of the Train view when they were last adopted.
@@ -46,6 +48,7 @@ impl IdentifiabilityView {
             analysis: None,
             problem: None,
             is_pending: false,
+            is_shown: false,
             axis: 2,
             followed: None,
             node: None,

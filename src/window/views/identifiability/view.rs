@@ -9,12 +9,12 @@ use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeri
 
 use super::{
     IdentifiabilityView, Question,
-    array_view::{identifiability_ui, shown, status_ui},
+    array_view::{identifiability_ui, shown, status},
     recording,
 };
 use crate::window::{
     glossary,
-    shared::{Effect, Offers, Shared, Shown, SourceKind, Unfinished, View},
+    shared::{Effect, Holdings, Offers, Shared, Shown, SourceKind, Status, View, ViewKind},
     theme::space,
     widgets::{
         dim_ui,
@@ -24,22 +24,8 @@ use crate::window::{
 };
 
 impl View for IdentifiabilityView {
-    fn name(&self) -> &'static str {
-        "Identifiability"
-    }
-
-    /// Shows the sensor and scene of the Train view, with what was last tried on them.
-    fn enter(&mut self, shared: &Shared) {
-        let is_other = shared
-            .draft
-            .simulation()
-            .is_some_and(|simulation| self.follow(simulation));
-        if is_other || self.problem.is_some() {
-            self.ask();
-        }
-    }
-
-    fn take_events(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+    fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.follow_shown(shared);
         self.study.take_events(effects);
         while let Some(answer) = self.worker.next_answer() {
             if answer.is_newest {
@@ -55,15 +41,15 @@ impl View for IdentifiabilityView {
         }
     }
 
-    fn is_working(&self) -> bool {
-        self.study.is_under_way()
+    fn holdings(&self, _shared: &Shared) -> Holdings {
+        Holdings {
+            is_computing: self.study.is_under_way(),
+            unfinished: self.study.unfinished().into_iter().collect(),
+            files: Vec::new(),
+        }
     }
 
-    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
-        self.study.unfinished().into_iter().collect()
-    }
-
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, _effects: &mut Vec<Effect>) {
+    fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, _effects: &mut Vec<Effect>) {
         if shared.source == SourceKind::Recording {
             recording::offer_actions(&mut self.study, offers, shared);
         }
@@ -83,17 +69,32 @@ impl View for IdentifiabilityView {
         }
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        match shared.source {
-            SourceKind::Array => identifiability_ui(ui, self, shared, effects),
-            SourceKind::Recording => recording::body_ui(ui, &mut self.study, shared),
-        }
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
+        Some(match shared.source {
+            SourceKind::Array => {
+                identifiability_ui(ui, self, shared, effects);
+                status(self)
+            }
+            SourceKind::Recording => {
+                recording::body_ui(ui, &mut self.study, shared);
+                recording::status(&self.study, shared)
+            }
+        })
     }
+}
 
-    fn status_ui(&self, ui: &mut Ui, shared: &Shared) {
-        match shared.source {
-            SourceKind::Array => status_ui(ui, self),
-            SourceKind::Recording => recording::status_ui(ui, &self.study, shared),
+impl IdentifiabilityView {
+    /// When the view is shown, takes the sensor and scene of the Train view, with what was last tried on them.
+    fn follow_shown(&mut self, shared: &Shared) {
+        let was_shown = std::mem::replace(&mut self.is_shown, shared.shown == ViewKind::Sensor);
+        if self.is_shown && !was_shown {
+            let is_other = shared
+                .draft
+                .simulation()
+                .is_some_and(|simulation| self.follow(simulation));
+            if is_other || self.problem.is_some() {
+                self.ask();
+            }
         }
     }
 }

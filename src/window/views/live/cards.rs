@@ -20,6 +20,7 @@ use crate::window::{
     plotting::{cells_ui, titled_plots_ui},
     shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
+    test_view::HeightScale,
     theme::{Theme, semibold, space, type_size},
     widgets::{
         card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
@@ -131,7 +132,18 @@ fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, look: Look, effects
 
 /// Returns the surfaces of an answer on a common scale.
 pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
-    let dressed = |surface: &Surface| look.dressed(surface, surface.title.clone());
+    let dressed = |surface: &Surface| {
+        let heights = surface.nodes.iter().map(|node| node.z).filter(|z| z.is_finite());
+        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+        let is_free = look.heights == HeightScale::Fitted && low <= high;
+        Surface {
+            // The resolution is a nanometre.
+            range: if is_free { low..=high.max(low + 1e-6) } else { surface.range.clone() },
+            mode: look.mode,
+            colours: look.colours,
+            ..surface.clone()
+        }
+    };
     SurfaceFigure {
         surfaces: answer.surfaces.iter().map(dressed).collect(),
         camera: look.camera,

@@ -214,6 +214,14 @@ pub struct Picked {
     pub file: Arc<NetworkFile>,
 }
 
+impl Picked {
+    /// A network that was opened from a file.
+    pub fn file(name: String, file: NetworkFile) -> Self {
+        let file = Arc::new(file);
+        Self { run: None, name, file }
+    }
+}
+
 /// Shows the list of networks, and what the chosen one is.
 fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let runs = shared.runs.workspace.runs.iter().rev();

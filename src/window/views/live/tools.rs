@@ -7,133 +7,101 @@ use decoupler_files::{
     export::{Cell, Table, TableColumn, atomic_write, is_same},
     live::Recorded,
 };
-use eframe::egui::{Align, Key, Label, Layout, Modifiers, RichText, Slider, Ui, Widget, WidgetInfo};
+use eframe::egui::{Align, Label, Layout, RichText, Slider, Ui, Widget, WidgetInfo};
 
 use super::{LiveView, cards::surface_figure, engine::Answered};
 use crate::window::{
     glossary,
-    shared::{Effect, FileTask, FileWords, Offers, Shared, Shown},
-    theme::{Theme, space, type_size},
-    widgets::{dim_ui, ghost_button, primary_button, slider_ui, with_shortcut},
+    shared::{Command, Effect, FileTask, FileWords, Offers, Shared, Shown},
+    theme::{space, type_size},
+    widgets::{dim_ui, ghost_button, primary_button, slider_ui},
 };
 
-/// What the user does with a source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Tool {
-    Stop,
-    Start,
-    Record,
-    ReZero,
-    Play,
+/// Commands on a source, from right to left.
+const COMMANDS: [Command; 5] = [
+    Command::Cancel("Stop live decoding"),
+    Command::Begin("Start live decoding"),
+    Command::Record,
+    Command::ReZero,
+    Command::PlayReplay,
+];
+
+/// Returns the text of the button of a command.
+fn button(command: &Command, view: &LiveView) -> &'static str {
+    match command {
+        Command::Cancel(_) => "■ Stop",
+        Command::Begin(_) => "▶ Start",
+        Command::Record if view.is_recording() => "■ End recording",
+        Command::Record => "● Record",
+        Command::ReZero => "Re-zero",
+        _ if view.shown.replay.is_some_and(|replay| replay.is_playing) => "⏸ Pause",
+        _ => "▶ Play",
+    }
 }
 
-impl Tool {
-    /// All of them, from right to left.
-    const ALL: [Self; 5] = [Self::Stop, Self::Start, Self::Record, Self::ReZero, Self::Play];
+/// Returns the reason why a command is not available now, if there is one.
+fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<String> {
+    let (is_running, is_replay) = (view.running.is_some(), view.shown.replay.is_some());
+    let reason = match command {
+        Command::Begin(_) if is_running => "Frames are being decoded.",
+        Command::Begin(_) => return view.plan(shared).err(),
+        _ if !is_running => "Start a source first.",
+        Command::PlayReplay if !is_replay => "There is no replay.",
+        Command::Record | Command::ReZero if !view.has_sensor(shared) => "This needs the sensor model of an array.",
+        Command::Record if is_replay => "A replay cannot be recorded.",
+        _ => return None,
+    };
+    Some(reason.to_owned())
+}
 
-    /// Returns its name, its key and its hint.
-    fn words(self) -> (&'static str, Option<Key>, &'static str) {
-        match self {
-            Self::Stop => ("Stop live decoding", Some(Key::Period), "Ends live decoding"),
-            Self::Start => (
-                "Start live decoding",
-                Some(Key::Enter),
-                "Decodes the frames of the source as they arrive",
-            ),
-            Self::Record => (
-                "Start or end recording",
-                Some(Key::R),
-                "Writes every frame with its time to a new file, as it arrives",
-            ),
-            Self::ReZero => ("Re-zero", None, glossary::UNLOADED_STATE.hint),
-            Self::Play => ("Pause or resume replay", Some(Key::P), "Plays or pauses the recording"),
+fn carry_out(command: &Command, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    match command {
+        Command::Cancel(_) => view.stop(),
+        Command::Begin(_) => view.start(shared, effects),
+        Command::Record => view.record(shared),
+        Command::ReZero => view.re_zero(),
+        _ => {
+            let plays = view.shown.replay.is_some_and(|replay| !replay.is_playing);
+            view.control(move |control, now| control.play(plays, now));
         }
     }
+}
 
-    /// Returns the text of its button.
-    fn button(self, view: &LiveView) -> &'static str {
-        match self {
-            Self::Stop => "■ Stop",
-            Self::Start => "▶ Start",
-            Self::Record if view.is_recording() => "■ End recording",
-            Self::Record => "● Record",
-            Self::ReZero => "Re-zero",
-            Self::Play if view.shown.replay.is_some_and(|replay| replay.is_playing) => "⏸ Pause",
-            Self::Play => "▶ Play",
-        }
-    }
-
-    /// Returns the reason why it is not available now, if there is one.
-    fn obstacle(self, view: &LiveView, shared: &Shared) -> Option<String> {
-        let is_running = view.running.is_some();
-        let reason = match self {
-            Self::Start if is_running => "Frames are being decoded.",
-            Self::Start => return view.plan(shared).err(),
-            _ if !is_running => "Start a source first.",
-            Self::Play if view.shown.replay.is_none() => "There is no replay.",
-            Self::Record | Self::ReZero if !view.has_sensor(shared) => "This needs the sensor model of an array.",
-            Self::Record if view.shown.replay.is_some() => "A replay cannot be recorded.",
-            Self::Stop | Self::Record | Self::ReZero | Self::Play => return None,
-        };
-        Some(reason.to_owned())
-    }
-
-    fn act(self, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-        match self {
-            Self::Stop => view.stop(),
-            Self::Start => view.start(shared, effects),
-            Self::Record => view.record(shared),
-            Self::ReZero => view.re_zero(),
-            Self::Play => {
-                let plays = view.shown.replay.is_some_and(|replay| !replay.is_playing);
-                view.control(move |control, now| control.play(plays, now));
-            }
-        }
-    }
-
-    /// Shows its button.
-    fn ui(self, ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-        let (_, key, hint) = self.words();
-        let hint = key.map_or_else(|| hint.to_owned(), |key| with_shortcut(ui, hint, key));
-        let obstacle = self.obstacle(view, shared);
-        let text = self.button(view);
-        let button = ui.add_enabled_ui(obstacle.is_none(), |ui| match self {
-            Self::Start => primary_button(text).ui(ui),
-            Self::Record if view.is_recording() => ui.add(ghost_button(text).fill(Theme::of(ui).palette.selected)),
-            Self::Play => ui.add(ghost_button(text).min_size([space(18), space(6)].into())),
-            Self::Stop | Self::Record | Self::ReZero => ui.add(ghost_button(text)),
-        });
-        let button = button.inner.on_hover_text(hint);
-        if button.on_disabled_hover_text(obstacle.unwrap_or_default()).clicked() {
-            self.act(view, shared, effects);
-        }
+/// Shows the button of a command.
+fn command_ui(ui: &mut Ui, command: &Command, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let (about, obstacle, text) = (
+        command.about(),
+        obstacle(command, view, shared),
+        button(command, view),
+    );
+    let hint = match about.keys {
+        Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
+        None => glossary::UNLOADED_STATE.hint.to_owned(),
+    };
+    let button = ui.add_enabled_ui(obstacle.is_none(), |ui| match command {
+        Command::Begin(_) => primary_button(text).ui(ui),
+        Command::PlayReplay => ui.add(ghost_button(text).min_size([space(18), space(6)].into())),
+        _ => ui.add(ghost_button(text).selected(*command == Command::Record && view.is_recording())),
+    });
+    let button = button.inner.on_hover_text(hint);
+    if button.on_disabled_hover_text(obstacle.unwrap_or_default()).clicked() {
+        carry_out(command, view, shared, effects);
     }
 }
 
 /// Shows the buttons that control the source, from right to left.
 pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    for tool in Tool::ALL {
-        match tool {
-            Tool::Play => continue,
-            Tool::Record | Tool::ReZero if !view.has_sensor(shared) => continue,
-            Tool::Record => ui.add_space(space(2)),
-            Tool::Stop | Tool::Start | Tool::ReZero => {}
-        }
-        tool.ui(ui, view, shared, effects);
+    let count = if view.has_sensor(shared) { 4 } else { 2 };
+    for command in &COMMANDS[..count] {
+        command_ui(ui, command, view, shared, effects);
     }
 }
 
-/// Offers the actions on the source.
-pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-    for tool in Tool::ALL {
-        let (name, key, _) = tool.words();
-        let is_possible = tool.obstacle(view, shared).is_none();
-        let is_wanted = match key {
-            Some(key) => offers.offer_keys(name, Modifiers::COMMAND, key, is_possible),
-            None => offers.offer(name, is_possible),
-        };
-        if is_wanted {
-            tool.act(view, shared, effects);
+/// Offers the commands on the source.
+pub fn take_commands(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+    for command in COMMANDS {
+        if offers.offer(command.clone(), obstacle(&command, view, shared).is_none()) {
+            carry_out(&command, view, shared, effects);
         }
     }
 }
@@ -146,7 +114,7 @@ pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects:
     let Some(replay) = view.shown.replay else { return };
     let is_running = view.running.is_some();
     ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-        Tool::Play.ui(ui, view, shared, effects);
+        command_ui(ui, &Command::PlayReplay, view, shared, effects);
         if !is_running {
             ui.disable();
         }

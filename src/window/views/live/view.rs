@@ -13,7 +13,7 @@ use decoupler_files::{
     export::{NetworkFile, atomic_write},
     live::{Input, LiveArray, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
 };
-use eframe::egui::{Color32, RichText, Ui};
+use eframe::egui::Ui;
 
 use super::{
     cards,
@@ -23,9 +23,7 @@ use super::{
 };
 use crate::window::{
     job::{Background, Wake},
-    shared::{Effect, FileInUse, FileWords, Matter, Notice, Offers, Shared, Shown, View},
-    theme::{Palette, Theme, type_size},
-    widgets::state_ui,
+    shared::{Effect, FileInUse, FileWords, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Tone, View},
 };
 
 /// The Live view.
@@ -307,51 +305,43 @@ impl LiveView {
             return;
         }
         self.load(move || {
+            let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-            Ok((read_network(&path, name.into_owned())?, None))
+            Ok((Picked::file(name.into_owned(), file), None))
         });
     }
 
-    /// Returns the state of the stream, with its colour.
-    fn status(&self, palette: &Palette) -> (Color32, String) {
-        let counts = &self.shown.counts;
-        if self.running.is_none() {
-            let text = match counts.decoded {
-                0 => "Ready: press Start".to_owned(),
-                decoded => format!("Stopped after {}", counted(decoded, "frame")),
-            };
-            return (palette.dim, text);
-        }
-        let fault = self.shown.answer.as_ref().map(|answer| &answer.fault);
-        let (colour, text) = match (fault, self.shown.replay) {
-            (None, _) => (palette.accent, "Waiting for the first frame"),
-            _ if counts.is_waiting => (palette.warning, "No frame for two seconds"),
-            (Some(Some((fault, _))), _) => return (palette.warning, format!("Fault: {fault}")),
-            (_, Some(replay)) if !replay.is_playing => (palette.dim, "Replay paused"),
-            (_, Some(_)) => (palette.good, "Replaying"),
-            (_, None) => (palette.good, "Live"),
-        };
-        (colour, text.to_owned())
-    }
-
-    /// Returns what the status line adds: the network and its source, and the rate.
-    fn status_notes(&self) -> Vec<String> {
+    /// Returns the state of the stream, its network and source, and its rate.
+    fn status(&self) -> Status {
+        let Snapshot { answer, counts, replay, .. } = &self.shown;
         let Some(running) = &self.running else {
-            return Vec::new();
+            return match counts.decoded {
+                0 => Status::new(Tone::Calm, "Ready: press Start"),
+                decoded => Status::new(Tone::Calm, format!("Stopped after {}", counted(decoded, "frame"))),
+            };
         };
-        let counts = &self.shown.counts;
-        let rate = (counts.decoded > 0).then(|| format!("{:.0} frames per second", counts.frames_per_second));
-        std::iter::once(format!("{}, {}", running.network, running.source_text()))
-            .chain(rate)
-            .collect()
+        let fault = answer.as_ref().map(|answer| &answer.fault);
+        let mut status = match (fault, replay) {
+            (None, _) => Status::new(Tone::Busy, "Waiting for the first frame"),
+            _ if counts.is_waiting => Status::new(Tone::Warning, "No frame for two seconds"),
+            (Some(Some((fault, _))), _) => Status::new(Tone::Warning, format!("Fault: {fault}")),
+            (_, Some(replay)) if !replay.is_playing => Status::new(Tone::Calm, "Replay paused"),
+            (_, Some(_)) => Status::new(Tone::Good, "Replaying"),
+            (_, None) => Status::new(Tone::Good, "Live"),
+        };
+        status = status.with_note(format!("{}, {}", running.network, running.source_text()));
+        if counts.decoded > 0 {
+            status = status.with_note(format!("{:.0} frames per second", counts.frames_per_second));
+        }
+        if let Some(recorded) = self.shown.recorded.as_ref().filter(|_| self.is_recording()) {
+            let (frames, seconds) = (counted(recorded.frames, "frame"), recorded.seconds);
+            status = status.with_note(format!("● Recording: {frames}, {seconds:.1} s"));
+        }
+        status
     }
 }
 
 impl View for LiveView {
-    fn name(&self) -> &'static str {
-        "Live"
-    }
-
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         let notify = |notice| Effect::Notify(Matter::Live, notice);
         while let Some(event) = self.job.next_event() {
@@ -386,22 +376,22 @@ impl View for LiveView {
         }
     }
 
-    fn is_working(&self) -> bool {
-        self.running.is_some()
-    }
-
-    fn files_in_use(&self) -> Vec<FileInUse> {
+    fn holdings(&self, _shared: &Shared) -> Holdings {
         let replayed = self.running.as_ref().and_then(|running| match &running.source {
             SourcePlan::Replay(path) => Some(FileInUse::Recording(path.clone())),
             _ => None,
         });
         let recorded = self.shown.recorded.as_ref().filter(|_| self.is_recording());
         let recorded = recorded.map(|recorded| FileInUse::Recorded(recorded.path.clone()));
-        replayed.into_iter().chain(recorded).collect()
+        Holdings {
+            is_computing: self.running.is_some(),
+            files: replayed.into_iter().chain(recorded).collect(),
+            ..Holdings::default()
+        }
     }
 
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-        tools::offer_actions(self, offers, shared, effects);
+    fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        tools::take_commands(self, offers, shared, effects);
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -416,28 +406,13 @@ impl View for LiveView {
         form_ui(ui, self, shared, effects);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         cards::body_ui(ui, self, shared, effects);
         // The thread may send the next snapshot.
         if std::mem::take(&mut self.is_to_be_drawn) {
             self.command(Command::Drawn);
         }
-    }
-
-    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        let palette = Theme::of(ui).palette;
-        let (colour, text) = self.status(&palette);
-        ui.horizontal_centered(|ui| {
-            state_ui(ui, colour, &text);
-            for note in self.status_notes() {
-                ui.label(RichText::new(note).size(type_size().note).color(palette.dim));
-            }
-            if let Some(recorded) = self.shown.recorded.as_ref().filter(|_| self.is_recording()) {
-                let frames = counted(recorded.frames, "frame");
-                let text = format!("● Recording: {frames}, {:.1} s", recorded.seconds);
-                ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
-            }
-        });
+        Some(self.status())
     }
 }
 
@@ -447,26 +422,16 @@ fn folder(shared: &Shared) -> PathBuf {
     parent.map_or_else(std::env::temp_dir, PathBuf::from)
 }
 
-fn read_network(path: &Path, name: String) -> Result<Picked, String> {
-    let file = NetworkFile::load(path).map_err(|error| error.to_string())?;
-    let (run, file) = (None, Arc::new(file));
-    Ok(Picked { run, name, file })
-}
-
-/// Writes the sample recording, and the network that decodes it, to files.
+/// Writes the sample recording to a file, and returns the network that decodes it.
 fn write_sample(folder: &Path) -> Result<(Picked, Option<PathBuf>), String> {
     let failed = |error: &dyn std::fmt::Display| format!("the sample cannot be written: {error}");
-    fs::create_dir_all(folder).map_err(|error| failed(&error))?;
-    let write = |name: &str, text: &str| {
-        let path = folder.join(name);
-        let written = atomic_write(&path, |file| file.write_all(text.as_bytes()));
-        written.map(|()| path).map_err(|error| failed(&error))
-    };
-    let (name, network) = (
-        "sample network.json",
-        include_str!("../../../../assets/samples/network.json"),
+    let text = include_str!("../../../../assets/samples/network.json");
+    let file = NetworkFile::from_text(text).map_err(|error| error.to_string())?;
+    let (text, path) = (
+        include_str!("../../../../assets/samples/recording.csv"),
+        folder.join("sample recording.csv"),
     );
-    let network = read_network(&write(name, network)?, name.to_owned())?;
-    let recording = include_str!("../../../../assets/samples/recording.csv");
-    Ok((network, Some(write("sample recording.csv", recording)?)))
+    fs::create_dir_all(folder).map_err(|error| failed(&error))?;
+    atomic_write(&path, |writer| writer.write_all(text.as_bytes())).map_err(|error| failed(&error))?;
+    Ok((Picked::file("sample network.json".to_owned(), file), Some(path)))
 }

@@ -24,7 +24,7 @@ use decoupler_files::{
 use super::TradeOffForm;
 use crate::window::{
     job::{Background, Report, Wake},
-    shared::{Effect, Exporting, Matter, NetworkSource, Shared, View as _},
+    shared::{Effect, Exporting, Matter, NetworkSource, Shared, ViewKind},
 };
 
 /// The Trade-off view.
@@ -151,7 +151,7 @@ impl TradeOffView {
 
     /// Returns true if no other computation of this program is running, which would distort the times.
     pub(super) fn is_quiet(&self, shared: &Shared) -> bool {
-        !shared.phase.is_busy() && shared.working.iter().all(|&name| name == self.name())
+        !shared.phase.is_busy() && shared.working.iter().all(|&view| view == ViewKind::TradeOff)
     }
 
     /// Returns true if the form can be measured now.

@@ -13,7 +13,7 @@ use decoupler_files::{
     export::{format_duration, trade_off_points, trade_off_summary},
     figure::{Figure, trade_off_figure},
 };
-use eframe::egui::{Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, TextEdit, Ui, vec2};
+use eframe::egui::{Align, ComboBox, Key, Layout, RichText, Sense, TextEdit, Ui, vec2};
 
 use super::{
     PointWish, Thoroughness, TradeOffEnding, TradeOffForm, TradeOffLook, TradeOffOutcome, TradeOffView, WhichPresets,
@@ -22,19 +22,18 @@ use super::{
     state::TradeOffEvent,
 };
 use crate::window::{
-    shared::{Effect, Matter, Notice, Offers, Shared, Shown, SourceKind, Unfinished, View, sentence},
-    theme::{Theme, semibold, space, type_size},
+    shared::{
+        Command, Effect, Holdings, Matter, Notice, Offers, Shared, Shown, SourceKind, Status, Tone, Unfinished, View,
+        sentence,
+    },
+    theme::{semibold, space, type_size},
     widgets::{
         card_ui, dim_ui, fields::count_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
-        progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, state_ui, with_shortcut,
+        progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, with_shortcut,
     },
 };
 
 impl View for TradeOffView {
-    fn name(&self) -> &'static str {
-        "Trade-off"
-    }
-
     fn take_events(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         while let Some(event) = self.job.next_event() {
             match event {
@@ -61,41 +60,31 @@ impl View for TradeOffView {
         }
     }
 
-    fn is_working(&self) -> bool {
-        self.running.is_some()
-    }
-
-    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+    fn holdings(&self, _shared: &Shared) -> Holdings {
         let unfinished = self.outcome.iter().filter_map(|outcome| {
             let (done, all) = outcome.points();
             let progress = format!("{done} of {} measured", counted(all, "point"));
             let is_unsaved =
                 outcome.ending == Some(TradeOffEnding::Complete) && !outcome.is_saved.load(Ordering::Relaxed);
             if self.running.is_some() {
-                Some(Unfinished::discarded("Measurement", progress))
+                Some(Unfinished::new("Measurement", progress))
             } else {
                 let progress = format!("{progress}, not exported as a table");
-                is_unsaved.then(|| Unfinished::discarded("Measurement", progress))
+                is_unsaved.then(|| Unfinished::new("Measurement", progress))
             }
         });
-        unfinished.collect()
+        Holdings {
+            is_computing: self.running.is_some(),
+            unfinished: unfinished.collect(),
+            files: Vec::new(),
+        }
     }
 
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-        if offers.offer_keys(
-            "Measure trade-off",
-            Modifiers::COMMAND,
-            Key::Enter,
-            self.can_measure(shared),
-        ) {
+    fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.offer(Command::Begin("Measure trade-off"), self.can_measure(shared)) {
             self.measure(shared, effects);
         }
-        if offers.offer_keys(
-            "Cancel measuring",
-            Modifiers::COMMAND,
-            Key::Period,
-            self.running.is_some(),
-        ) {
+        if offers.offer(Command::Cancel("Cancel measuring"), self.running.is_some()) {
             self.cancel();
         }
     }
@@ -108,12 +97,9 @@ impl View for TradeOffView {
         form_ui(ui, self, shared, effects);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         trade_ui(ui, self, shared, effects);
-    }
-
-    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        status_ui(ui, self);
+        Some(status(self))
     }
 }
 
@@ -246,12 +232,11 @@ fn has_noise(outcome: &TradeOffOutcome) -> bool {
 }
 
 /// Shows the state of the measurement in the line at the bottom.
-fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
-    let palette = Theme::of(ui).palette;
-    let (colour, text) = match (&trade.running, &trade.outcome) {
+fn status(trade: &TradeOffView) -> Status {
+    let (tone, text) = match (&trade.running, &trade.outcome) {
         (Some(_), Some(outcome)) => {
             let (done, all) = outcome.points();
-            (palette.accent, format!("Measuring: {done} of {all} points"))
+            (Tone::Busy, format!("Measuring: {done} of {all} points"))
         }
         (_, Some(outcome)) => {
             let (done, all) = outcome.points();
@@ -259,21 +244,24 @@ fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
                 .took
                 .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
             match outcome.ending {
-                Some(TradeOffEnding::Complete) => (palette.good, format!("Measured {all} points{took}")),
-                _ => (palette.warning, format!("Ended early: {done} of {all} points{took}")),
+                Some(TradeOffEnding::Complete) => (Tone::Good, format!("Measured {all} points{took}")),
+                _ => (Tone::Warning, format!("Ended early: {done} of {all} points{took}")),
             }
         }
-        (_, None) => (palette.dim, "Ready: press Measure".to_owned()),
+        (_, None) => (Tone::Calm, "Ready: press Measure".to_owned()),
     };
-    ui.horizontal_centered(|ui| {
-        state_ui(ui, colour, &text);
-        if let Some(outcome) = &trade.outcome {
+    let status = Status::new(tone, text);
+    match &trade.outcome {
+        Some(outcome) => {
             let unit = outcome.decoded.as_deref().filter(|_| !has_noise(outcome));
             let unit = unit.map_or_else(String::new, |unit| format!(", times of {unit}"));
-            let text = format!("{}, one thread, median of many{unit}", outcome.plan.source_name());
-            ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+            status.with_note(format!(
+                "{}, one thread, median of many{unit}",
+                outcome.plan.source_name()
+            ))
         }
-    });
+        None => status,
+    }
 }
 
 /// Returns what the view shows: charts and table at the displayed noise level, and every point.

@@ -2,7 +2,7 @@ use decoupler_files::figure::{
     Decoded, ErrorBins, Figure, HeatMap, Ink, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
     hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, training_state_figure,
 };
-use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
+use eframe::egui::{Ui, UiBuilder};
 
 use super::{
     inspect::{Along, bar_nodes_ui, section_bar_ui, section_of, take_pointed, with_lights},
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::window::{
     plotting::{Pointer, cells_ui, plots_ui},
-    shared::{Effect, Offers, Phase, Shared, SourceKind, target_choice_ui},
+    shared::{Command, Effect, Offers, Phase, Shared, SourceKind, target_choice_ui},
     test_view::Positions,
     theme::{Theme, space},
     widgets::{invitation_ui, tabs_ui},
@@ -151,38 +151,30 @@ impl TrainView {
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
         // The readings have their own card if there is room.
         for (tab, name) in BottomTab::offered(shared, false) {
-            if offers.offer(format!("Chart: {name}"), tab != self.tab) {
+            if offers.offer(Command::Chart(name), tab != self.tab) {
                 self.tab = tab;
             }
         }
-        let steps = [(-1, "Previous", Key::OpenBracket), (1, "Next", Key::CloseBracket)];
         match (self.tab, shared.test()) {
             (BottomTab::Section, Some(test)) => {
-                for (by, word, key) in steps {
-                    let is_possible = self.section.can_step(by, test);
-                    if offers.offer_keys(format!("{word} section"), Modifiers::NONE, key, is_possible) {
+                for (by, command) in [(-1, Command::PreviousSection), (1, Command::NextSection)] {
+                    if offers.offer(command, self.section.can_step(by, test)) {
                         self.section.step(by, test);
                     }
                 }
-                let (name, other) = match self.section.along {
-                    Along::RowWires => ("Section along a column-wire", Along::ColumnWires),
-                    Along::ColumnWires => ("Section along a row-wire", Along::RowWires),
+                let (command, other) = match self.section.along {
+                    Along::RowWires => (Command::SectionAlongColumns, Along::ColumnWires),
+                    Along::ColumnWires => (Command::SectionAlongRows, Along::RowWires),
                 };
-                if offers.offer_keys(name, Modifiers::NONE, Key::Backslash, true) {
+                if offers.offer(command, true) {
                     self.section.along = other;
                 }
             }
             (BottomTab::ErrorHistogram, _) => {
                 let bar = self.lights.bar.unwrap_or(ErrorBins::COUNT / 2);
-                for (by, word, key) in steps {
+                for (by, command) in [(-1, Command::PreviousBar), (1, Command::NextBar)] {
                     let next = bar.checked_add_signed(by).filter(|bar| *bar < ErrorBins::COUNT);
-                    let is_possible = next.is_some() && shared.result().is_some();
-                    if offers.offer_keys(
-                        format!("{word} bar of the histogram"),
-                        Modifiers::NONE,
-                        key,
-                        is_possible,
-                    ) {
+                    if offers.offer(command, next.is_some() && shared.result().is_some()) {
                         self.lights.bar = next;
                     }
                 }

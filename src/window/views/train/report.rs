@@ -32,7 +32,7 @@ use crate::window::{
         view::TrainView,
     },
     widgets::{
-        Landmark, described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
+        described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
         section_heading_ui,
     },
 };
@@ -41,7 +41,7 @@ use crate::window::{
 pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
         press_section_ui(ui, &mut view.press, shared);
-        let heading = section_heading_ui(ui, "Errors on the test set");
+        section_heading_ui(ui, "Errors on the test set");
         let result = view.result(shared).cloned();
         let shown = shared.shown_run().zip(result.as_ref());
         if let Some((run, result)) = shown {
@@ -75,7 +75,6 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         } else {
             expectation_ui(ui, shared);
         }
-        Landmark::Errors.stands_at(ui, ui.min_rect().with_min_y(heading.rect.top()));
         section_heading_ui(ui, "Open");
         let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
         ui.add_enabled_ui(can_open, |ui| open_ui(ui, shared, effects));

@@ -22,7 +22,7 @@ use crate::window::{
     surface_view::{ColourBar, SurfaceView},
     test_view::{HeightScale, Positions, TestView},
     theme::{Theme, semibold, space, type_size},
-    widgets::{Landmark, card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
+    widgets::{card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
 };
 
 /// Work of the pointer on the actual surface.
@@ -252,9 +252,7 @@ fn surface_ui(
     } else {
         surface_view.show(ui, look.camera)
     };
-    if role == Role::Actual {
-        Landmark::ActualSurface.stands_at(ui, shown.response.rect);
-    }
+    if role == Role::Actual {}
     if let (Role::Actual, Some(test)) = (role, array) {
         view.press.take_target(&shown, surface);
         let painter = ui.painter();

@@ -1,8 +1,8 @@
-use std::{path::PathBuf, sync::Arc};
+use std::sync::Arc;
 
 use decoupler_core::{text::counted, training::StopReason};
 use decoupler_files::import::Setup;
-use eframe::egui::{Context, Key, Modifiers, Sense, Ui};
+use eframe::egui::{Sense, Ui};
 use ndarray::Array2;
 
 use super::{
@@ -10,7 +10,7 @@ use super::{
     configuration::configuration_ui,
     decoders::{DecoderMeasuring, DecodersState},
     drawn::{Drawn, Frames},
-    exports::{PaperFigure, checkpoint_task, shown},
+    exports::{PaperFigure, shown},
     inspect::{Lighting, SectionChoice, TestPlace, drawn_nodes},
     press::{PressState, readings_head_ui},
     recording::{RecordingEditor, recipe_task},
@@ -21,8 +21,8 @@ use super::{
 use crate::window::{
     job::Wake,
     shared::{
-        Columns, Effect, FileInUse, Look, Matter, Notice, Offers, Phase, RightCard, RunCommand, RunResult, RunView,
-        Shared, Shown, SourceKind, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, Look, MIN_WIDTH_FOR_REPORT, Matter, Notice, Offers, Phase, RightCard, RunResult,
+        RunView, Shared, Shown, SourceKind, Status, Unfinished, View, run_buttons_ui,
     },
     test_view::RecordedTest,
     theme::space,
@@ -30,10 +30,6 @@ use crate::window::{
 };
 
 impl View for TrainView {
-    fn name(&self) -> &'static str {
-        "Train"
-    }
-
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
         self.measuring.follow(shared, &mut self.decoders);
@@ -41,101 +37,68 @@ impl View for TrainView {
         effects.extend(failure.map(|reason| Effect::Notify(Matter::Training, Notice::Failed(reason))));
     }
 
-    fn take_files(&mut self, paths: &[PathBuf], shared: &Shared, effects: &mut Vec<Effect>) -> bool {
-        if shared.phase.is_busy() {
-            let text = "A training is running: stop it before you open other files.";
-            effects.push(Effect::Notify(Matter::Recording, Notice::Failed(text.to_owned())));
-        } else {
-            self.recording.open(paths.to_vec());
-        }
-        true
-    }
-
-    fn files_in_use(&self) -> Vec<FileInUse> {
-        self.recording.files_in_use()
-    }
-
-    fn unfinished(&self, shared: &Shared) -> Vec<Unfinished> {
-        let mut unfinished = Vec::from_iter(unfinished_training(shared));
+    fn holdings(&self, _shared: &Shared) -> Holdings {
+        let mut unfinished = Vec::new();
         if self.decoders.is_measuring() {
             let results = self.decoders.measured.as_deref().unwrap_or_default();
             let measured = results.iter().filter(|result| result.report.is_some()).count();
             let progress = format!("{measured} of {} measured", counted(results.len(), "decoder"));
-            unfinished.push(Unfinished::discarded("More decoders", progress));
+            unfinished.push(Unfinished::new("More decoders", progress));
         }
-        unfinished
+        Holdings {
+            is_computing: false,
+            unfinished,
+            files: self.recording.files_in_use(),
+        }
     }
 
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.is_heard {
+            let frames = self.frames().clone();
+            self.press
+                .take_pointer(offers.ctx, shared.test(), &frames, self.lights.node);
+            self.follow(shared);
+        }
         let phase = shared.phase;
-        let is_idle = !phase.is_busy() && phase != Phase::Died;
-        if offers.offer_keys("Train", Modifiers::COMMAND, Key::Enter, is_idle) {
+        if offers.offer(Command::Train, shared.can_train()) {
             effects.push(Effect::Train);
         }
-        if offers.offer("Continue training", shared.can_continue()) {
+        if offers.offer(Command::TrainLonger, shared.can_continue()) {
             effects.push(Effect::Continue);
         }
         let (name, effect) = if phase == Phase::Paused {
-            ("Resume training", Effect::Resume)
+            (Command::ResumeTraining, Effect::Resume)
         } else {
-            ("Pause training", Effect::Pause)
+            (Command::PauseTraining, Effect::Pause)
         };
         let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-        if offers.offer_keys(name, Modifiers::COMMAND, Key::P, can_pause) {
+        if offers.offer(name, can_pause) {
             effects.push(effect);
         }
-        if offers.offer_keys("Stop training", Modifiers::COMMAND, Key::Period, phase.is_busy()) {
+        if offers.offer(Command::StopTraining, phase.is_busy()) {
             effects.push(Effect::Stop);
         }
-        if offers.offer("Open files", !phase.is_busy()) {
+        if offers.offer(Command::OpenFiles, !phase.is_busy()) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
         if shared.source == SourceKind::Array
-            && offers.offer("Press the middle of the surface", shared.test().is_some())
+            && offers.offer(Command::PressMiddle, shared.test().is_some())
             && let Some(test) = shared.test()
         {
             self.press.press_middle(test);
         }
-        let what = snapshot_word(shared.source);
         let has_next = self.snapshot + 1 < Self::snapshots(shared);
-        if offers.offer_keys(format!("Next test {what}"), Modifiers::NONE, Key::PageDown, has_next) {
+        if offers.offer(Command::NextSample, has_next) {
             self.show_snapshot(self.snapshot + 1);
         }
-        let name = format!("Previous test {what}");
-        if offers.offer_keys(name, Modifiers::NONE, Key::PageUp, self.snapshot > 0) {
+        if offers.offer(Command::PreviousSample, self.snapshot > 0) {
             self.show_snapshot(self.snapshot - 1);
         }
         self.offer_charts(offers, shared);
     }
 
-    fn take_pointer(&mut self, ctx: &Context, shared: &Shared) {
-        let frames = self.frames().clone();
-        self.press.take_pointer(ctx, shared.test(), &frames, self.lights.node);
-        self.follow(shared);
-    }
-
-    fn columns(&self, window_width: f32) -> Columns {
-        let has_report = WorkbenchLayout::of_width(window_width) == WorkbenchLayout::ReportBeside;
-        Columns {
-            form_width: if has_report { space(68) } else { space(62) },
-            has_report,
-        }
-    }
-
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let can_train = shared.phase != Phase::Died;
-        let hint = match shared.source {
-            SourceKind::Array => "draws the sets and trains the network",
-            SourceKind::Recording => "reads the recording and trains the network",
-        };
-        let command = run_buttons_ui(ui, shared.phase, (can_train, shared.can_continue()), hint);
-        effects.extend(command.map(|command| match command {
-            RunCommand::Train => Effect::Train,
-            RunCommand::Continue => Effect::Continue,
-            RunCommand::Pause => Effect::Pause,
-            RunCommand::Resume => Effect::Resume,
-            RunCommand::Stop => Effect::Stop,
-        }));
+        run_buttons_ui(ui, shared, effects);
         ui.add_space(space(4));
         let what = snapshot_word(shared.source);
         if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, Self::snapshots(shared)) {
@@ -160,9 +123,10 @@ impl View for TrainView {
         report::report_ui(ui, self, shared, effects);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         if self.recording.is_on_show(shared) {
-            return self.recording.columns_ui(ui, shared, effects);
+            self.recording.columns_ui(ui, shared, effects);
+            return None;
         }
         self.follow(shared);
         if self.watched != self.snapshot {
@@ -170,6 +134,7 @@ impl View for TrainView {
             effects.push(Effect::Watch(self.snapshot));
         }
         workbench_ui(ui, self, shared, effects);
+        None
     }
 }
 
@@ -178,36 +143,6 @@ fn snapshot_word(source: SourceKind) -> &'static str {
     match source {
         SourceKind::Array => "snapshot",
         SourceKind::Recording => "sample",
-    }
-}
-
-/// Returns the training if it is being prepared or has unsaved epochs.
-fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
-    let training = |progress, saving| Unfinished {
-        work: "Training",
-        progress,
-        saving,
-        is_kept: shared.runs.path.is_some(),
-    };
-    let run = shared.run.as_ref();
-    match shared.phase {
-        Phase::Preparing => {
-            let progress = match shared.source {
-                SourceKind::Array => "its samples are being drawn",
-                SourceKind::Recording => "its files are being read",
-            };
-            Some(training(progress.to_owned(), None))
-        }
-        Phase::Training | Phase::Paused | Phase::Calibrating => {
-            let run = run.filter(|run| !run.is_saved)?;
-            let epochs = run.settings().training.stopping.epochs;
-            let epoch = run.latest().map_or(0, |latest| latest.epoch);
-            Some(training(
-                format!("epoch {epoch} of {epochs}"),
-                Some(checkpoint_task(run)),
-            ))
-        }
-        Phase::Idle | Phase::Ended(_) | Phase::Died => None,
     }
 }
 
@@ -223,9 +158,7 @@ pub enum WorkbenchLayout {
 impl WorkbenchLayout {
     /// Returns the position in a window of this width in points.
     pub fn of_width(width: f32) -> Self {
-        /// Window width from which a column next to the surfaces leaves them enough room.
-        const MIN_FOR_COLUMN: f32 = 1400.0;
-        if width < MIN_FOR_COLUMN {
+        if width < MIN_WIDTH_FOR_REPORT {
             Self::ReportBelow
         } else {
             Self::ReportBeside

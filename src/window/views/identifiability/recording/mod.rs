@@ -4,4 +4,4 @@ mod study;
 mod view;
 
 pub use study::RecordingStudy;
-pub use view::{body_ui, form_ui, offer_actions, shown, status_ui};
+pub use view::{body_ui, form_ui, offer_actions, shown, status};

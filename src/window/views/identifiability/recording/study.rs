@@ -85,8 +85,8 @@ impl RecordingStudy {
     /// Returns the work under way.
     pub fn unfinished(&self) -> Option<Unfinished> {
         Some(match self.under_way? {
-            UnderWay::Findings => Unfinished::discarded("Analysis", "it takes seconds".to_owned()),
-            UnderWay::CrossValidation => Unfinished::discarded("Cross-validation", format!("{} folds", self.folds)),
+            UnderWay::Findings => Unfinished::new("Analysis", "it takes seconds".to_owned()),
+            UnderWay::CrossValidation => Unfinished::new("Cross-validation", format!("{} folds", self.folds)),
         })
     }
 

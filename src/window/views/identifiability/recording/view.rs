@@ -5,18 +5,18 @@ use decoupler_files::{
     export::{describe_target, error_table, format_below_one, format_duration},
     import::Setup,
 };
-use eframe::egui::{Key, Modifiers, RichText, Sense, Ui};
+use eframe::egui::{Key, RichText, Sense, Ui};
 
 use super::{
     RecordingStudy,
     study::{FoldsResult, RecordingFindings, UnderWay},
 };
 use crate::window::{
-    shared::{Offers, Shared, Shown, error_table_ui, sentence},
-    theme::{Theme, space, type_size},
+    shared::{Command, Offers, Shared, Shown, Status, Tone, error_table_ui, sentence},
+    theme::{space, type_size},
     widgets::{
         card_ui, dim_ui, fields::count_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
-        scrolled_ui, section_heading_ui, state_ui, with_shortcut,
+        scrolled_ui, section_heading_ui, with_shortcut,
     },
 };
 
@@ -92,8 +92,8 @@ fn changed_ui(ui: &mut Ui, of: &Setup, now: Option<&Setup>) {
 /// Offers to analyse, to cross-validate and to cancel.
 pub fn offer_actions(study: &mut RecordingStudy, offers: &mut Offers<'_>, shared: &Shared) {
     let ready = ready(shared).filter(|_| !study.is_under_way());
-    let is_analysed = offers.offer_keys("Analyse readings", Modifiers::COMMAND, Key::Enter, ready.is_some());
-    let is_validated = offers.offer("Cross-validate", ready.is_some());
+    let is_analysed = offers.offer(Command::Begin("Analyse readings"), ready.is_some());
+    let is_validated = offers.offer(Command::CrossValidate, ready.is_some());
     if let Some(setup) = ready {
         if is_analysed {
             study.analyse(setup);
@@ -101,26 +101,23 @@ pub fn offer_actions(study: &mut RecordingStudy, offers: &mut Offers<'_>, shared
             study.cross_validate(setup);
         }
     }
-    if offers.offer_keys("Cancel analysis", Modifiers::COMMAND, Key::Period, study.is_under_way()) {
+    if offers.offer(Command::Cancel("Cancel analysis"), study.is_under_way()) {
         study.cancel();
     }
 }
 
 /// Shows the state of the analysis in the line at the bottom.
-pub fn status_ui(ui: &mut Ui, study: &RecordingStudy, shared: &Shared) {
-    let palette = Theme::of(ui).palette;
-    let (colour, text) = match (study.under_way, &study.found) {
-        (Some(under_way), _) => (palette.accent, progress(under_way, study)),
-        (None, Some(found)) => (palette.good, format!("Analysed {}", counted(found.samples, "sample"))),
-        (None, None) => (palette.dim, "Ready: press Analyse readings".to_owned()),
+pub fn status(study: &RecordingStudy, shared: &Shared) -> Status {
+    let (tone, text) = match (study.under_way, &study.found) {
+        (Some(under_way), _) => (Tone::Busy, progress(under_way, study)),
+        (None, Some(found)) => (Tone::Good, format!("Analysed {}", counted(found.samples, "sample"))),
+        (None, None) => (Tone::Calm, "Ready: press Analyse readings".to_owned()),
     };
-    ui.horizontal_centered(|ui| {
-        state_ui(ui, colour, &text);
-        if let Ok(setup) = shared.setup() {
-            let name = RichText::new(setup.source_name()).size(type_size().note);
-            ui.label(name.color(palette.dim));
-        }
-    });
+    let status = Status::new(tone, text);
+    match shared.setup() {
+        Ok(setup) => status.with_note(setup.source_name()),
+        Err(_) => status,
+    }
 }
 
 /// Shows the held-out errors of the cross-validation and its remarks.

@@ -23,7 +23,7 @@ use crate::window::{
     theme::{Theme, space, type_size},
     views::train::{exports::PaperFigure, recording::RecordingEditor},
     widgets::{
-        Landmark, dim_ui, explained_options_ui,
+        dim_ui, explained_options_ui,
         fields::{capitalised, input_text, list_ui, options_ui, quantity_ui, usually},
         fold_ui, ghost_button, scrolled_ui,
     },
@@ -78,7 +78,6 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
     let is_busy = shared.phase.is_busy();
     let noise_of = |draft: &RunSettings| draft.simulation().map(|simulation| simulation.scene.noise);
     let followed = present(&draft);
-    let top = ui.cursor().top();
     ui.add_enabled_ui(!is_busy, |ui| {
         let Some(simulation) = draft.simulation_mut() else {
             return;
@@ -93,7 +92,6 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
         workload_ui(ui, &draft);
     });
     method_ui(ui, &mut draft, shared.phase);
-    Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
     ui.add_enabled_ui(!is_busy, |ui| {
         preset_section_ui(ui, &mut draft);
         if let Some(simulation) = draft.simulation_mut() {
@@ -140,7 +138,6 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
 fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, effects: &mut Vec<Effect>) {
     let mut settings = shared.recording.settings;
     let is_busy = shared.phase.is_busy();
-    let top = ui.cursor().top();
     ui.add_enabled_ui(!is_busy, |ui| recording.files_ui(ui, shared, effects));
     recording.columns_button_ui(ui, shared);
     ui.add_space(space(2));
@@ -160,7 +157,6 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
             recorded_workload_ui(ui, &settings, size);
         }
     }
-    Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
     ui.add_space(space(2));
     ui.separator();
     ui.add_enabled_ui(!is_busy, |ui| {
