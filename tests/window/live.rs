@@ -54,7 +54,9 @@ fn start(driver: &mut Driver) {
 /// The number at the beginning of what a text says after `name`; 0 if there is no such text.
 fn number(driver: &Driver, name: &str) -> f64 {
     let texts = driver.texts();
-    let number = texts.iter().find_map(|text| text.strip_prefix(name)?.split(' ').next()?.parse().ok());
+    let number = texts
+        .iter()
+        .find_map(|text| text.strip_prefix(name)?.split(' ').next()?.parse().ok());
     number.unwrap_or(0.0)
 }
 

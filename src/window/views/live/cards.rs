@@ -2,7 +2,7 @@
 
 use decoupler_core::{live::ZeroGains, text::counted};
 use decoupler_files::{
-    export::{format_duration, format_number},
+    export::format_number,
     figure::{
         HeatMap,
         surface::{Quantity, Surface, SurfaceFigure},
@@ -47,10 +47,8 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
     let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
     let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-    let (mut upper, left) = (
-        upper.with_max_y(upper.bottom() - gap),
-        left.with_max_x(left.right() - gap),
-    );
+    let mut upper = upper.with_max_y(upper.bottom() - gap);
+    let left = left.with_max_x(left.right() - gap);
     if let Some(readings) = &answer.readings {
         let readings = readings.clone().coloured(shared.look.colours);
         card_ui(ui, left, |ui| readings_ui(ui, &readings, &answer.faulty));
@@ -138,7 +136,11 @@ pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look)
         let is_free = look.heights == HeightScale::Fitted && low <= high;
         Surface {
             // The resolution is a nanometre.
-            range: if is_free { low..=high.max(low + 1e-6) } else { surface.range.clone() },
+            range: if is_free {
+                low..=high.max(low + 1e-6)
+            } else {
+                surface.range.clone()
+            },
             mode: look.mode,
             colours: look.colours,
             ..surface.clone()
@@ -163,9 +165,6 @@ fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mu
         ui.add_space(space(1));
         ui.label(RichText::new(text).color(Theme::of(ui).palette.dim));
         ui.add_space(space(4));
-        if view.running.is_some() {
-            return;
-        }
         if button.is_some_and(|button| ui.add(primary_button(button)).clicked()) {
             match button {
                 Some(TRAIN) => effects.extend([Effect::ShowTraining, Effect::Train]),
@@ -284,19 +283,11 @@ fn stream_ui(ui: &mut Ui, counts: &Tally) {
         true => "waiting".to_owned(),
         false => format!("{:.0} frames per second", counts.frames_per_second),
     };
-    let latency = match [0.5, 0.99].map(|share| counts.latencies.quantile(share)) {
-        [Some(median), Some(high)] => format!("p50 {}, p99 {}", format_duration(median), format_duration(high)),
-        _ => format_number(None),
-    };
     fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
-    let hint = "Time from reading a frame to its answer: median, and the 99th percentile, which one frame in a hundred exceeds.";
-    fact_ui(ui, "Latency", hint, &latency);
-    fact_ui(
-        ui,
-        "Decoded",
-        "Frames decoded since the start.",
-        &counts.decoded.to_string(),
-    );
+    let hint = "Time from reading a frame to its answer: median, 99th percentile and maximum.";
+    let latency = counts.latencies.to_string();
+    fact_ui(ui, "Latency", hint, latency.trim_start_matches("latency "));
+    fact_ui(ui, "Decoded", "Frames since the start.", &counts.decoded.to_string());
     let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
     fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
     let hint = "Malformed lines, and frames that could not be decoded.";
@@ -311,25 +302,19 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
         return;
     };
     section_heading_ui(ui, "Zero");
-    let (low, high) = gains.iter().fold((f64::MAX, f64::MIN), |(low, high), &gain| {
-        (low.min(gain), high.max(gain))
-    });
-    let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest.";
-    fact_ui(ui, "Gains", hint, &format!("{low:.4} to {high:.4}"));
-    let hint =
-        "Rows in contact during the re-zero: only the gains of their columns were taken, so that the contact is kept.";
+    let low = gains.iter().copied().fold(f64::MAX, f64::min);
+    let high = gains.iter().copied().fold(f64::MIN, f64::max);
     let touched = in_contact.iter().filter(|touched| **touched).count();
-    fact_ui(
-        ui,
-        "Rows in contact",
-        hint,
-        &format!("{touched} of {}", in_contact.len()),
+    let text = format!(
+        "{low:.4} to {high:.4}, {touched} of {} rows in contact",
+        in_contact.len()
     );
-    let (clear, hint) = (
-        ghost_button("Clear zero"),
-        "Compares readings with the model at rest again.",
-    );
-    if ui.add(clear).on_hover_text(hint).clicked() {
+    let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest. Of rows in contact \
+                only the gains of their columns were taken, so that the contact is kept.";
+    fact_ui(ui, "Gains", hint, &text);
+    let clear = ui.add(ghost_button("Clear zero"));
+    let hint = "Compares readings with the model at rest again.";
+    if clear.on_hover_text(hint).clicked() {
         view.clear_zero();
     }
 }

@@ -13,7 +13,8 @@ use std::{
 
 use decoupler_core::{
     job::Job,
-    live::{FaultEvent, FaultyWire, ZeroGains},
+    live::{DriftMonitor, FaultEvent, FaultyWire, ZeroGains},
+    problem::Problem,
     surface::SurfaceMap,
     text::{capitalised, counted},
 };
@@ -73,7 +74,7 @@ pub fn run(
     report: &Report<LiveEvent>,
 ) -> Result<(), String> {
     plan.source = plan.source.resolved();
-    let mut screen = Screen::new(&plan, shown)?;
+    let mut screen = Screen::new(&plan, shown);
     let mut session = match Session::open(plan, &Job::new(&|| report.is_cancelled())) {
         Err(_) if report.is_cancelled() => return Ok(()),
         opened => opened.map_err(|error| error.to_string())?,
@@ -192,13 +193,13 @@ pub struct Fact {
 }
 
 impl Fact {
-    /// A figure that does not warn.
-    pub fn new(name: &'static str, hint: impl Into<String>, value: impl Into<String>) -> Self {
+    fn new(name: &'static str, hint: impl Into<String>, value: String, warns: bool) -> Self {
+        let hint = hint.into();
         Self {
             name,
-            hint: hint.into(),
-            value: value.into(),
-            warns: false,
+            hint,
+            value,
+            warns,
         }
     }
 }
@@ -220,55 +221,50 @@ pub struct Screen {
 /// Returns the surfaces of the last answer.
 type Surfaces = Box<dyn Fn(&Session) -> Vec<Surface>>;
 
+/// Returns the names of the nodes, and the surfaces through them; `None` if there is no surface.
+fn surfaces(problem: &Problem) -> Option<(Arc<[String]>, Surfaces)> {
+    let Some(simulation) = &problem.sensor else {
+        let surface = TargetSurface::new(&problem.positions, &problem.targets).ok();
+        let surface = surface.filter(|_| !problem.positions.is_empty())?;
+        let nodes = surface.nodes().iter();
+        let nodes = nodes.map(|node| problem.targets[node.target].title()).collect();
+        let surfaces = move |session: &Session| {
+            let (values, range) = (&session.last.values, surface.range_of(&session.ranges));
+            let [_, decoded, _] = surface.surfaces(values, values, range);
+            vec![decoded]
+        };
+        return Some((nodes, Box::new(surfaces)));
+    };
+    let (sensor, scene) = (simulation.sensor, &simulation.scene);
+    let rows = scene.rows.read(sensor.scale.rows()).ok()?;
+    let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
+    let map = SurfaceMap::shared(&x_mm, &y_mm).ok()?;
+    let height_mm = sensor.geometry.height_mm;
+    let range_mm = height_mm - scene.stroke_mm(&sensor.geometry)..=height_mm;
+    let name = |row: &usize, node: usize| format!("Row {}, node {node}", row + 1);
+    let of_row = |row| (1..=sensor.scale.nodes_per_row()).map(move |node| name(row, node));
+    let nodes = rows.iter().flat_map(of_row).collect();
+    let surface = move |title: &str, nodes_mm: Vec<DVec3>| {
+        Surface::through(title, &map, nodes_mm, Quantity::Height, range_mm.clone())
+    };
+    let surfaces = move |session: &Session| {
+        let decoded = session.last.values.chunks_exact(3).map(DVec3::from_slice);
+        let actual = session.input.truth().map(|truth| {
+            let nodes_mm = rows.iter().flat_map(|&row| truth.row_positions_mm(&sensor, row));
+            surface("Actual", nodes_mm.collect())
+        });
+        let decoded = surface("Decoded", decoded.collect());
+        std::iter::once(decoded).chain(actual).collect()
+    };
+    Some((nodes, Box::new(surfaces)))
+}
+
 impl Screen {
     /// Prepares the surfaces of `plan`; `shown` is what was displayed before.
-    ///
-    /// # Errors
-    /// If no surface goes through the nodes of the array.
-    pub fn new(plan: &SessionPlan, shown: Snapshot) -> Result<Self, String> {
-        let problem = &plan.network.problem;
-        let (nodes, surfaces): (_, Surfaces) = match &problem.sensor {
-            Some(simulation) => {
-                let (sensor, scene) = (simulation.sensor, &simulation.scene);
-                let rows = scene.rows.read(sensor.scale.rows());
-                let rows = rows.map_err(|error| error.to_string())?;
-                let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
-                let map = SurfaceMap::shared(&x_mm, &y_mm).map_err(|error| error.to_string())?;
-                let height_mm = sensor.geometry.height_mm;
-                let range_mm = height_mm - scene.stroke_mm(&sensor.geometry)..=height_mm;
-                let per_row = sensor.scale.nodes_per_row();
-                let name = |row: &usize, node: usize| format!("Row {}, node {node}", row + 1);
-                let of_row = |row| (1..=per_row).map(move |node| name(row, node));
-                let nodes = rows.iter().flat_map(of_row).collect();
-                let surface = move |title: &str, nodes_mm: Vec<DVec3>| {
-                    Surface::through(title, &map, nodes_mm, Quantity::Height, range_mm.clone())
-                };
-                let surfaces = move |session: &Session| {
-                    let decoded = session.last.values.chunks_exact(3).map(DVec3::from_slice);
-                    let actual = session.input.truth().map(|truth| {
-                        let nodes_mm = rows.iter().flat_map(|&row| truth.row_positions_mm(&sensor, row));
-                        surface("Actual", nodes_mm.collect())
-                    });
-                    let decoded = surface("Decoded", decoded.collect());
-                    std::iter::once(decoded).chain(actual).collect()
-                };
-                (nodes, Box::new(surfaces))
-            }
-            None => match TargetSurface::new(&problem.positions, &problem.targets) {
-                Ok(surface) if !problem.positions.is_empty() => {
-                    let nodes = surface.nodes().iter();
-                    let nodes = nodes.map(|node| problem.targets[node.target].title()).collect();
-                    let surfaces = move |session: &Session| {
-                        let (values, range) = (&session.last.values, surface.range_of(&session.ranges));
-                        let [_, decoded, _] = surface.surfaces(values, values, range);
-                        vec![decoded]
-                    };
-                    (nodes, Box::new(surfaces))
-                }
-                _ => (Arc::default(), Box::new(|_| Vec::new())),
-            },
-        };
-        Ok(Self {
+    pub fn new(plan: &SessionPlan, shown: Snapshot) -> Self {
+        let none = || -> (_, Surfaces) { (Arc::default(), Box::new(|_| Vec::new())) };
+        let (nodes, surfaces) = surfaces(&plan.network.problem).unwrap_or_else(none);
+        Self {
             shown,
             has_answer: false,
             network: Arc::clone(&plan.network),
@@ -276,7 +272,7 @@ impl Screen {
             nodes,
             surfaces,
             peak_percent: 0.0,
-        })
+        }
     }
 
     /// Returns the snapshot of now.
@@ -341,7 +337,7 @@ impl Screen {
             let hint = "Mean |error| of z over all nodes, compared with the simulated truth, over the latest frames.";
             let error_mm = session.tally.error_mm;
             let value = error_mm.map_or_else(|| format_number(None), |mm| format!("{} mm", format_number(mm)));
-            answered.confidence.push(Fact::new("Error", hint, value));
+            answered.confidence.push(Fact::new("Error", hint, value, false));
         }
         answered
     }
@@ -368,27 +364,30 @@ impl Screen {
             "{}\n\nIt is as small as the noise of a reading if the answer explains the readings.",
             glossary::RESIDUAL.hint
         );
-        Fact::new("Residual of Eq. (2)", hint, value)
+        Fact::new("Residual of Eq. (2)", hint, value, false)
     }
 
     fn drift(&self, session: &Session) -> Fact {
-        const NAME: &str = "Drift of the readings";
-        let drift = match &session.monitor {
-            Ok(monitor) => monitor.drift(),
-            Err(reason) => return Fact::new(NAME, format!("Drift is not monitored: {reason}."), "not monitored"),
+        let (hint, value, warns) = match session.monitor.as_ref().map(DriftMonitor::drift) {
+            Err(reason) => (
+                format!("Drift is not monitored: {reason}."),
+                "not monitored".to_owned(),
+                false,
+            ),
+            Ok(None) => (DRIFT.to_owned(), "none".to_owned(), false),
+            Ok(Some(drift)) => {
+                let text = drift.describe(&self.network.problem.inputs);
+                (DRIFT.to_owned(), capitalised(&text), true)
+            }
         };
-        let hint = "Readings that do not look like those of the training: prediction intervals do not hold. Check the sensor \
-                    and its connection, re-zero it, or train with recent samples. The warning ends when the readings are \
-                    back to normal. In readings like those of the training, a false alarm occurs on average at most once in \
-                    10 000 blocks of readings, each at least five times as long as neighbouring readings are correlated.";
-        let inputs = &self.network.problem.inputs;
-        let value = drift.map_or_else(|| "none".to_owned(), |drift| capitalised(&drift.describe(inputs)));
-        Fact {
-            warns: drift.is_some(),
-            ..Fact::new(NAME, hint, value)
-        }
+        Fact::new("Drift of the readings", hint, value, warns)
     }
 }
+
+const DRIFT: &str = "Readings that do not look like those of the training: prediction intervals do not hold. Check the sensor and \
+                     its connection, re-zero it, or train with recent samples. The warning ends when the readings are back to \
+                     normal. In readings like those of the training, a false alarm occurs on average at most once in 10 000 \
+                     blocks of readings, each at least five times as long as neighbouring readings are correlated.";
 
 /// Returns how many of `of` readings, and of the targets, are outside the range seen in training.
 fn outside(session: &Session, of: usize, target: &str) -> Fact {
@@ -405,10 +404,8 @@ fn outside(session: &Session, of: usize, target: &str) -> Fact {
         "Readings beyond the range seen in training by more than a tenth of it, and {target}s beyond by more than all of it. \
          There the network extrapolates: check these readings, or train with samples that cover them."
     );
-    Fact {
-        warns: readings.unwrap_or(0) + targets > 0,
-        ..Fact::new("Outside training", hint, value)
-    }
+    let warns = readings.unwrap_or(0) + targets > 0;
+    Fact::new("Outside training", hint, value, warns)
 }
 
 /// Returns the present fault of the wires, and its consequence if there is one.
@@ -428,10 +425,7 @@ fn fault(watched: &Watched) -> (Fact, Option<String>) {
     };
     let hint = glossary::WIRE_FAULT.hint;
     let hint = format!("{hint} Looked for if the noise of a reading is known and the array not too large.");
-    let fact = Fact {
-        warns: consequence.is_some(),
-        ..Fact::new("Fault", hint, value)
-    };
+    let fact = Fact::new("Fault", hint, value, consequence.is_some());
     (fact, consequence.map(|text| capitalised(&text)))
 }
 

@@ -89,8 +89,7 @@ impl SourceForm {
         Ok(match self.kind {
             SourceKind::Simulated if has_sensor => SourcePlan::Simulated(self.frames_per_second),
             SourceKind::Simulated => {
-                let reason = "A network of a recording decodes a file, a serial port or a TCP address: there is no sensor \
-                              model to simulate. Choose one of them as the source.";
+                let reason = "A network of a recording has no sensor model to simulate: choose another source.";
                 return Err(reason.to_owned());
             }
             SourceKind::Replay if self.path.trim().is_empty() => {
@@ -214,21 +213,13 @@ pub struct Picked {
     pub file: Arc<NetworkFile>,
 }
 
-impl Picked {
-    /// A network that was opened from a file.
-    pub fn file(name: String, file: NetworkFile) -> Self {
-        let file = Arc::new(file);
-        Self { run: None, name, file }
-    }
-}
-
 /// Shows the list of networks, and what the chosen one is.
 fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let runs = shared.runs.workspace.runs.iter().rev();
     let newest = runs.clone().next();
     let newest = newest.map_or_else(|| "no run yet".to_owned(), |run| format!("Newest run: {}", run.name));
-    let mut pick = view.picked(shared).map(|picked| picked.run);
-    let (before, shown) = match view.picked(shared) {
+    let mut pick = view.picked.as_ref().map(|picked| picked.run);
+    let (before, shown) = match &view.picked {
         Some(Picked { run: None, name, .. }) => (pick, format!("File: {name}")),
         Some(Picked { name, .. }) => (pick, name.clone()),
         None => (pick, newest.clone()),

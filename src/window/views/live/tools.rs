@@ -56,7 +56,8 @@ fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<Strin
 
 fn carry_out(command: &Command, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     match command {
-        Command::Cancel(_) => view.stop(),
+        // The thread ends once the sender of its commands is dropped; the last frame stays on the screen.
+        Command::Cancel(_) => view.running = None,
         Command::Begin(_) => view.start(shared, effects),
         Command::Record => view.record(shared),
         Command::ReZero => view.re_zero(),
@@ -69,11 +70,7 @@ fn carry_out(command: &Command, view: &mut LiveView, shared: &Shared, effects: &
 
 /// Shows the button of a command.
 fn command_ui(ui: &mut Ui, command: &Command, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let (about, obstacle, text) = (
-        command.about(),
-        obstacle(command, view, shared),
-        button(command, view),
-    );
+    let (about, obstacle, text) = (command.about(), obstacle(command, view, shared), button(command, view));
     let hint = match about.keys {
         Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
         None => glossary::UNLOADED_STATE.hint.to_owned(),

@@ -31,10 +31,10 @@ use crate::window::{
 pub struct LiveView {
     /// The latest state of the session, which stays on the screen after its end.
     pub shown: Snapshot,
-    /// Decoding under way. It is dropped before the job, which then ends at once.
+    /// Decoding under way. Its thread ends once this is dropped.
     pub running: Option<Running>,
     /// The network that decodes; `None` for the newest run.
-    picked: Option<Picked>,
+    pub(super) picked: Option<Picked>,
     pub(super) source: SourceForm,
     /// The node under the pointer, marked on all surfaces.
     pub(super) node: Option<usize>,
@@ -87,15 +87,9 @@ impl LiveView {
         }
     }
 
-    /// Returns the network that was picked, unless it is that of a run that was removed.
-    pub(super) fn picked(&self, shared: &Shared) -> Option<&Picked> {
-        let is_there = |picked: &&Picked| picked.run.is_none_or(|id| shared.runs.run(id).is_some());
-        self.picked.as_ref().filter(is_there)
-    }
-
     /// Returns the network that decodes, and its name; `None` if there is none.
     pub(super) fn network<'a>(&'a self, shared: &'a Shared) -> Option<(&'a str, &'a Arc<NetworkFile>)> {
-        let picked = self.picked(shared).map(|picked| (&*picked.name, &picked.file));
+        let picked = self.picked.as_ref().map(|picked| (&*picked.name, &picked.file));
         picked.or_else(|| shared.runs.newest().map(|run| (run.name, run.file)))
     }
 
@@ -147,7 +141,7 @@ impl LiveView {
     }
 
     /// Begins to decode.
-    pub(super) fn start(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+    pub fn start(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         effects.push(Effect::Settle(Matter::Live));
         self.begin(shared, None);
     }
@@ -189,12 +183,6 @@ impl LiveView {
             move |report| run(plan, shown, &incoming, report),
             |ended| LiveEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
         );
-    }
-
-    /// Stops decoding; the last frame stays on the screen.
-    pub(super) fn stop(&mut self) {
-        // The thread ends once the sender of its commands is dropped.
-        self.running = None;
     }
 
     fn command(&self, command: Command) {
@@ -273,13 +261,6 @@ impl LiveView {
         self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
     }
 
-    /// Connects again to the stream that has ended.
-    pub fn retry(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        if self.can_retry(shared) {
-            self.start(shared, effects);
-        }
-    }
-
     /// Reads a network in the background.
     pub(super) fn load(&mut self, read: impl FnOnce() -> Result<(Picked, Option<PathBuf>), String> + Send + 'static) {
         self.loading.start(
@@ -307,20 +288,21 @@ impl LiveView {
         self.load(move || {
             let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-            Ok((Picked::file(name.into_owned(), file), None))
+            let (run, name, file) = (None, name.into_owned(), Arc::new(file));
+            Ok((Picked { run, name, file }, None))
         });
     }
 
     /// Returns the state of the stream, its network and source, and its rate.
     fn status(&self) -> Status {
-        let Snapshot { answer, counts, replay, .. } = &self.shown;
+        let (counts, replay) = (&self.shown.counts, &self.shown.replay);
         let Some(running) = &self.running else {
             return match counts.decoded {
                 0 => Status::new(Tone::Calm, "Ready: press Start"),
                 decoded => Status::new(Tone::Calm, format!("Stopped after {}", counted(decoded, "frame"))),
             };
         };
-        let fault = answer.as_ref().map(|answer| &answer.fault);
+        let fault = self.shown.answer.as_ref().map(|answer| &answer.fault);
         let mut status = match (fault, replay) {
             (None, _) => Status::new(Tone::Busy, "Waiting for the first frame"),
             _ if counts.is_waiting => Status::new(Tone::Warning, "No frame for two seconds"),
@@ -363,13 +345,12 @@ impl View for LiveView {
         }
         self.take_chosen();
         match self.loading.next_event() {
-            Some(Ok((picked, None))) => {
+            Some(Ok((picked, recording))) => {
                 self.picked = Some(picked);
-                self.restart(shared);
-            }
-            Some(Ok((picked, Some(recording)))) => {
-                self.picked = Some(picked);
-                self.replay(&recording, shared, effects);
+                match recording {
+                    Some(recording) => self.replay(&recording, shared, effects),
+                    None => self.restart(shared),
+                }
             }
             Some(Err(reason)) => effects.push(notify(Notice::Failed(reason))),
             None => {}
@@ -427,11 +408,10 @@ fn write_sample(folder: &Path) -> Result<(Picked, Option<PathBuf>), String> {
     let failed = |error: &dyn std::fmt::Display| format!("the sample cannot be written: {error}");
     let text = include_str!("../../../../assets/samples/network.json");
     let file = NetworkFile::from_text(text).map_err(|error| error.to_string())?;
-    let (text, path) = (
-        include_str!("../../../../assets/samples/recording.csv"),
-        folder.join("sample recording.csv"),
-    );
+    let text = include_str!("../../../../assets/samples/recording.csv");
+    let path = folder.join("sample recording.csv");
     fs::create_dir_all(folder).map_err(|error| failed(&error))?;
     atomic_write(&path, |writer| writer.write_all(text.as_bytes())).map_err(|error| failed(&error))?;
-    Ok((Picked::file("sample network.json".to_owned(), file), Some(path)))
+    let (run, name, file) = (None, "sample network.json".to_owned(), Arc::new(file));
+    Ok((Picked { run, name, file }, Some(path)))
 }
