@@ -5,7 +5,7 @@ use decoupler_files::{
     export::format_number,
     figure::{
         HeatMap,
-        surface::{Quantity, Surface, SurfaceFigure},
+        surface::{Surface, SurfaceFigure},
     },
     live::{SourcePlan, Tally},
 };
@@ -61,9 +61,8 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
             None => "Decoded values",
         };
         card_ui(ui, place, |ui| titled_plots_ui(ui, title, chart));
-        card_ui(ui, left, |ui| {
-            scrolled_ui(ui, "live targets", |ui| values_ui(ui, &answer))
-        });
+        let values_ui = |ui: &mut Ui| values_ui(ui, &answer);
+        card_ui(ui, left, |ui| scrolled_ui(ui, "live targets", values_ui));
         upper = surface;
     }
     surfaces_ui(ui, upper, view, shared.look, effects);
@@ -90,11 +89,10 @@ fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, look: Look, effects
             ui.horizontal(|ui| {
                 ui.set_min_height(space(7));
                 ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    if index == 0 {
-                        view_mode_ui(ui, look, effects);
-                    }
-                });
+                if index == 0 {
+                    let at_right = Layout::right_to_left(Align::Center);
+                    ui.with_layout(at_right, |ui| view_mode_ui(ui, look, effects));
+                }
             });
             let shown = SurfaceView {
                 label: &format!("Live {} surface", surface.title.to_lowercase()),
@@ -109,13 +107,9 @@ fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, look: Look, effects
             shown.node_tooltip_ui(|ui, node| {
                 let name = answer.nodes.get(node).map_or("", String::as_str);
                 ui.label(RichText::new(name).font(semibold(type_size().note)));
+                let unit = if answer.readings.is_some() { " mm" } else { "" };
                 let values = answer.surfaces.iter().filter_map(|surface| {
                     let value = format_number(surface.nodes.get(node)?.z);
-                    let unit = if surface.quantity == Quantity::Height {
-                        " mm"
-                    } else {
-                        ""
-                    };
                     Some(format!("{} {value}{unit}", surface.title.to_lowercase()))
                 });
                 ui.label(RichText::new(Vec::from_iter(values).join(", ")).size(type_size().note));
@@ -133,18 +127,16 @@ pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look)
     let dressed = |surface: &Surface| {
         let heights = surface.nodes.iter().map(|node| node.z).filter(|z| z.is_finite());
         let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
-        let is_free = look.heights == HeightScale::Fitted && low <= high;
-        Surface {
-            // The resolution is a nanometre.
-            range: if is_free {
-                low..=high.max(low + 1e-6)
-            } else {
-                surface.range.clone()
-            },
+        let mut dressed = Surface {
             mode: look.mode,
             colours: look.colours,
             ..surface.clone()
+        };
+        if look.heights == HeightScale::Fitted && low <= high {
+            // The resolution is a nanometre.
+            dressed.range = low..=high.max(low + 1e-6);
         }
+        dressed
     };
     SurfaceFigure {
         surfaces: answer.surfaces.iter().map(dressed).collect(),
@@ -186,32 +178,26 @@ const START: &str = "Start this source";
 const HEADING: &str = "Decode live readings";
 
 /// Returns the heading and the text of an empty view, and its button.
-fn invitation(view: &LiveView, shared: &Shared) -> (String, String, Option<&'static str>) {
+fn invitation(view: &LiveView, shared: &Shared) -> (&'static str, String, Option<&'static str>) {
     if let Some(running) = &view.running {
-        let counts = &view.shown.counts;
-        let text = match &counts.last_bad {
-            Some(reason) => format!("Malformed lines: {}. Last: {reason}.", counts.bad),
-            None => "It appears here as soon as it arrives.".to_owned(),
+        let text = match &view.shown.counts.last_bad {
+            Some(reason) => format!("Malformed lines: {}. Last: {reason}.", view.shown.counts.bad),
+            None => format!("It appears here as soon as it arrives from {}.", running.source_text()),
         };
-        return (
-            format!("Waiting for the first frame from {}", running.source_text()),
-            text,
-            None,
-        );
+        return ("Waiting for the first frame", text, None);
     }
     let Some((name, file)) = view.network(shared) else {
         let is_busy = shared.phase.is_busy();
-        let text = match is_busy {
-            true => "One is being trained in the Train view: it can be used here as soon as it is finished.",
-            false => {
-                "Train one with the settings of the Train view, which takes from seconds to minutes, or open a network file."
-            }
-        };
+        let mut text =
+            "Train one with the settings of the Train view, which takes seconds to minutes, or open a network file.";
+        if is_busy {
+            text = "One is being trained in the Train view: it can be used here as soon as it is finished.";
+        }
         let text = format!("Live decoding needs a trained network. {text}");
-        return ("No network yet".to_owned(), text, (!is_busy).then_some(TRAIN));
+        return ("No network yet", text, (!is_busy).then_some(TRAIN));
     };
     let text = match view.plan(shared).map(|(_, plan)| plan.source) {
-        Err(obstacle) => return (HEADING.to_owned(), obstacle, None),
+        Err(obstacle) => return (HEADING, obstacle, None),
         Ok(SourcePlan::Simulated(_)) => format!(
             "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any hardware. To \
              decode your own, choose a replay, a serial port or a TCP address on the left."
@@ -219,7 +205,7 @@ fn invitation(view: &LiveView, shared: &Shared) -> (String, String, Option<&'sta
         Ok(_) if file.problem.sensor.is_some() => format!("The network '{name}' decodes its frames as they arrive."),
         Ok(_) => format!("The network '{name}' decodes its samples as they arrive, by the names of their columns."),
     };
-    (HEADING.to_owned(), text, Some(START))
+    (HEADING, text, Some(START))
 }
 
 /// Shows the readings of an array as a map of rows and columns, with the faulty wires marked.

@@ -423,8 +423,10 @@ fn fault(watched: &Watched) -> (Fact, Option<String>) {
             ("not a single-wire fault".to_owned(), Some(format!("{event}, {after}")))
         }
     };
-    let hint = glossary::WIRE_FAULT.hint;
-    let hint = format!("{hint} Looked for if the noise of a reading is known and the array not too large.");
+    let hint = format!(
+        "{} Looked for if the noise of a reading is known and the array not too large.",
+        glossary::WIRE_FAULT.hint
+    );
     let fact = Fact::new("Fault", hint, value, consequence.is_some());
     (fact, consequence.map(|text| capitalised(&text)))
 }

@@ -72,12 +72,10 @@ impl SourceForm {
     /// Returns the noise of a reading, relative to the reading, for a network of this simulation.
     pub fn noise(&self, simulation: &Simulation) -> f64 {
         let noise = simulation.scene.noise.in_test();
-        let of_scene = match self.kind {
-            _ if !noise.is_none() => noise.relative,
-            // Networks trained without noise amplify noise strongly.
-            SourceKind::Simulated => 1e-5,
-            SourceKind::Replay | SourceKind::Serial | SourceKind::Tcp => 1e-3,
-        };
+        let is_simulated = self.kind == SourceKind::Simulated;
+        // Networks trained without noise amplify noise strongly.
+        let usual = if is_simulated { 1e-5 } else { 1e-3 };
+        let of_scene = if noise.is_none() { usual } else { noise.relative };
         self.noise.unwrap_or(of_scene)
     }
 
@@ -114,10 +112,8 @@ impl SourceForm {
                      in a header.";
         match self.kind {
             SourceKind::Simulated => {
-                let (hint, rate) = (
-                    "Rate at which the simulated array is read.",
-                    &mut self.frames_per_second,
-                );
+                let hint = "Rate at which the simulated array is read.";
+                let rate = &mut self.frames_per_second;
                 quantity_ui(ui, "Frames per second", hint, rate, 0.1..=10_000.0, "Hz");
             }
             SourceKind::Replay => text_ui(ui, "Frames", FRAMES.description, &mut self.path),
@@ -133,15 +129,6 @@ impl SourceForm {
                 text_ui(ui, "Address", hint, &mut self.address);
                 dim_ui(ui, lines);
             }
-        }
-    }
-
-    fn noise_ui(&mut self, ui: &mut Ui, simulation: &Simulation) {
-        let hint = "Noise of a reading, simulated or of your device, relative to the reading (standard deviation). Fault and \
-                    contact detection use it: too small a value causes false alarms.";
-        let mut noise = self.noise(simulation);
-        if quantity_ui(ui, "Relative noise", hint, &mut noise, 0.0..=1.0, "").changed() {
-            self.noise = Some(noise);
         }
     }
 }
@@ -178,8 +165,13 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
                 open_ui(ui, view, "Choose file…", FRAMES, effects);
                 dim_ui(ui, "Frames and samples without times are replayed at 50 per second.");
             }
-            if let Some(simulation) = simulation.as_ref().and_then(Option::as_ref) {
-                view.source.noise_ui(ui, simulation);
+            if let Some(Some(simulation)) = &simulation {
+                let hint = "Noise of a reading, simulated or of your device, relative to the reading (standard deviation). Fault \
+                            and contact detection use it: too small a value causes false alarms.";
+                let mut noise = view.source.noise(simulation);
+                if quantity_ui(ui, "Relative noise", hint, &mut noise, 0.0..=1.0, "").changed() {
+                    view.source.noise = Some(noise);
+                }
             }
         });
         if view.source.kind == SourceKind::Simulated && has_sensor {

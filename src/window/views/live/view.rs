@@ -331,11 +331,9 @@ impl View for LiveView {
                 LiveEvent::Shown(shown) => (self.shown, self.is_to_be_drawn) = (*shown, true),
                 LiveEvent::Failed(reason) => effects.push(notify(Notice::Failed(reason))),
                 LiveEvent::Ended(end) => {
-                    let Some(Running { source, .. }) = self.running.take() else {
-                        continue;
-                    };
-                    let is_stream = self.shown.replay.is_none() && !matches!(source, SourcePlan::Simulated(_));
-                    self.ended = is_stream.then_some(source);
+                    let Some(running) = self.running.take() else { continue };
+                    let is_stream = self.shown.replay.is_none() && !matches!(running.source, SourcePlan::Simulated(_));
+                    self.ended = is_stream.then_some(running.source);
                     effects.push(notify(match end {
                         Err(reason) => Notice::Failed(reason),
                         Ok(()) => Notice::Done("The source has ended.".to_owned()),
