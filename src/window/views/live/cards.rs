@@ -2,7 +2,7 @@
 
 use decoupler_core::{live::ZeroGains, text::counted};
 use decoupler_files::{
-    export::format_number,
+    export::{format_duration, format_number},
     figure::{
         HeatMap,
         surface::{Surface, SurfaceFigure},
@@ -270,9 +270,10 @@ fn stream_ui(ui: &mut Ui, counts: &Tally) {
         false => format!("{:.0} frames per second", counts.frames_per_second),
     };
     fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
-    let hint = "Time from reading a frame to its answer: median, 99th percentile and maximum.";
-    let latency = counts.latencies.to_string();
-    fact_ui(ui, "Latency", hint, latency.trim_start_matches("latency "));
+    let hint = "Time from reading a frame to its answer: median and 99th percentile.";
+    let quantile = |share| counts.latencies.quantile(share);
+    let [median, high] = [0.5, 0.99].map(|share| quantile(share).map_or_else(|| format_number(None), format_duration));
+    fact_ui(ui, "Latency", hint, &format!("p50 {median}, p99 {high}"));
     fact_ui(ui, "Decoded", "Frames since the start.", &counts.decoded.to_string());
     let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
     fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
@@ -290,14 +291,12 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
     section_heading_ui(ui, "Zero");
     let low = gains.iter().copied().fold(f64::MAX, f64::min);
     let high = gains.iter().copied().fold(f64::MIN, f64::max);
+    let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest.";
+    fact_ui(ui, "Gains", hint, &format!("{low:.4} to {high:.4}"));
     let touched = in_contact.iter().filter(|touched| **touched).count();
-    let text = format!(
-        "{low:.4} to {high:.4}, {touched} of {} rows in contact",
-        in_contact.len()
-    );
-    let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest. Of rows in contact \
-                only the gains of their columns were taken, so that the contact is kept.";
-    fact_ui(ui, "Gains", hint, &text);
+    let touched = format!("{touched} of {}", in_contact.len());
+    let hint = "Of rows in contact only the gains of their columns were taken, so that the contact is kept.";
+    fact_ui(ui, "Rows in contact", hint, &touched);
     let clear = ui.add(ghost_button("Clear zero"));
     let hint = "Compares readings with the model at rest again.";
     if clear.on_hover_text(hint).clicked() {

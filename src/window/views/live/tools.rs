@@ -78,7 +78,8 @@ fn command_ui(ui: &mut Ui, command: &Command, view: &mut LiveView, shared: &Shar
     let button = ui.add_enabled_ui(obstacle.is_none(), |ui| match command {
         Command::Begin(_) => primary_button(text).ui(ui),
         Command::PlayReplay => ui.add(ghost_button(text).min_size([space(18), space(6)].into())),
-        _ => ui.add(ghost_button(text).selected(*command == Command::Record && view.is_recording())),
+        Command::Record => ui.add(ghost_button(text).selected(view.is_recording())),
+        _ => ui.add(ghost_button(text)),
     });
     let button = button.inner.on_hover_text(hint);
     if button.on_disabled_hover_text(obstacle.unwrap_or_default()).clicked() {
@@ -109,12 +110,11 @@ pub const REPLAY_BAR_HEIGHT: f32 = space(12);
 /// Shows the position in the recording and the speed.
 pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let Some(replay) = view.shown.replay else { return };
-    let is_running = view.running.is_some();
+    if view.running.is_none() {
+        ui.disable();
+    }
     ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
         command_ui(ui, &Command::PlayReplay, view, shared, effects);
-        if !is_running {
-            ui.disable();
-        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let text = RichText::new(format!("{:.1}×", view.source.speed)).size(type_size().note);
             ui.add_sized([space(8), space(6)], Label::new(text));
@@ -197,7 +197,7 @@ fn values_table(answer: &Answered) -> Table {
 }
 
 /// Saves a copy of a recording.
-pub fn save_recording(recorded: &Recorded) -> FileTask {
+fn save_recording(recorded: &Recorded) -> FileTask {
     let words = FileWords {
         kind: "recording",
         description: "Every frame with its time, as CSV: a line for each row-wire. It can be replayed here, and the terminal \

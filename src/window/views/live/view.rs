@@ -166,9 +166,10 @@ impl LiveView {
         };
         (self.node, self.ended, self.is_to_be_drawn) = (None, None, false);
         let (commands, incoming) = channel();
+        let source = plan.source.clone();
         self.running = Some(Running {
             network,
-            source: plan.source.clone(),
+            source,
             commands,
         });
         self.steer();
