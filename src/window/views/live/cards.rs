@@ -13,7 +13,7 @@ use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
 
 use super::{
     LiveView,
-    engine::{Answered, Fact},
+    engine::Answered,
     tools::{REPLAY_BAR_HEIGHT, replay_bar_ui},
 };
 use crate::window::{
@@ -244,15 +244,9 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
     }
     section_heading_ui(ui, "Confidence");
     let palette = Theme::of(ui).palette;
-    for Fact {
-        name,
-        hint,
-        value,
-        warns,
-    } in &answer.confidence
-    {
-        let colour = if *warns { palette.warning } else { palette.text };
-        coloured_fact_ui(ui, name, hint, value, colour);
+    for fact in &answer.confidence {
+        let colour = if fact.warns { palette.warning } else { palette.text };
+        coloured_fact_ui(ui, fact.name, &fact.hint, &fact.value, colour);
     }
     section_heading_ui(ui, "Stream");
     stream_ui(ui, &view.shown.counts);

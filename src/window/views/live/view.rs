@@ -166,10 +166,9 @@ impl LiveView {
         };
         (self.node, self.ended, self.is_to_be_drawn) = (None, None, false);
         let (commands, incoming) = channel();
-        let source = plan.source.clone();
         self.running = Some(Running {
             network,
-            source,
+            source: plan.source.clone(),
             commands,
         });
         self.steer();
