@@ -159,11 +159,11 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
 
     driver.click_button("Live");
     panics(&mut driver, "live", |driver| driver.click("▶ Start"));
-    panics(&mut driver, "sample", |driver| {
+    panics(&mut driver, "network file", |driver| {
         driver.click("Play the sample recording");
     });
     driver.click("▶ Start");
-    driver.wait("a frame", |driver| driver.has("Live decoupled surface"));
+    driver.wait("a frame", |driver| driver.has("Live decoded surface"));
     driver.click("■ Stop");
     panics(&mut driver, "network file", |driver| {
         driver.open_form("Open network file…");
