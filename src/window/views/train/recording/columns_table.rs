@@ -2,7 +2,7 @@
 //!
 //! It shows the range, the histogram and remarks of each column, and edits its meaning and unit.
 
-use std::{cell::Cell, rc::Rc};
+use std::{cell::Cell, ops::Range};
 
 use decoupler_core::text::counted;
 use decoupler_files::{
@@ -11,13 +11,13 @@ use decoupler_files::{
     import::{ColumnKind, ColumnSummary, InspectedFile, Meaning, Variable},
 };
 use eframe::egui::{
-    Color32, ComboBox, FontId, Label, Rect, Response, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2,
+    Align, Color32, ComboBox, Label, Layout, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2,
     vec2,
 };
 
 use super::{
-    draft::{Draft, file_name},
     editor::RecordingEditor,
+    import::{Import, file_name},
 };
 use crate::window::{
     theme::{Palette, Theme, space, type_size},
@@ -25,255 +25,178 @@ use crate::window::{
 };
 
 const ROW_HEIGHT: f32 = space(7);
-const MEANING_WIDTH: f32 = space(26);
-const UNIT_WIDTH: f32 = space(15);
+const MEANING_WIDTH: f32 = space(23);
+const UNIT_WIDTH: f32 = space(13);
 const COLUMNS: [TableColumn<'_>; 7] = [
     TableColumn::text("column").width(ColumnWidth::Rest),
-    TableColumn::text("meaning").width(ColumnWidth::Points(MEANING_WIDTH - space(3))),
-    TableColumn::text("unit").width(ColumnWidth::Points(UNIT_WIDTH - space(2))),
+    TableColumn::text("meaning").width(ColumnWidth::Points(MEANING_WIDTH)),
+    TableColumn::text("unit").width(ColumnWidth::Points(UNIT_WIDTH)),
     TableColumn::text("values").width(ColumnWidth::Points(space(16))),
     TableColumn::figure("from – to").width(ColumnWidth::Points(space(46))),
     TableColumn::figure("missing").width(ColumnWidth::Points(space(12))),
     TableColumn::text("remarks").width(ColumnWidth::Rest),
 ];
 
-/// A line of the table.
+/// A line of the table: a file and its place in the list of files, a variable or a column in it.
 #[derive(Clone, Copy)]
-enum Line {
-    File(usize),
-    Variable(usize, usize),
+enum Line<'a> {
+    File(usize, &'a InspectedFile),
+    Variable(usize, &'a Variable),
     Column(usize, usize),
 }
 
 /// A change made by the user.
 enum Change {
-    Meaning(usize, usize, Meaning),
-    All(usize, Meaning),
-    Variable(usize, usize, Meaning),
+    Meaning(usize, Range<usize>, Meaning),
+    /// The rows of a variable become the samples, and its columns get a meaning.
+    Variable(usize, String, Meaning),
     Unit(usize, usize, String),
 }
 
 impl RecordingEditor {
     /// Shows the columns of all files; changes their meanings and units.
     pub(super) fn columns_table_ui(&mut self, ui: &mut Ui, is_busy: bool) {
-        let Some(draft) = &mut self.draft else { return };
-        let mut change = None;
-        ui.add_enabled_ui(!is_busy, |ui| change = table_ui(ui, draft));
-        match change {
+        let Some(import) = &mut self.import else { return };
+        let change = Cell::new(None);
+        ui.add_enabled_ui(!is_busy, |ui| table_ui(ui, import, &change));
+        match change.take() {
             None => return,
-            Some(Change::Meaning(file, column, meaning)) => draft.choose(file, column, meaning),
-            Some(Change::All(file, meaning)) => draft.choose_all(file, meaning),
-            Some(Change::Variable(file, variable, meaning)) => {
-                if draft.choose_variable(file, variable, meaning) {
-                    self.read_again();
-                }
-            }
-            Some(Change::Unit(file, column, unit)) => draft.set_unit(file, column, &unit),
+            Some(Change::Meaning(file, columns, meaning)) => import.set_meanings(file, columns, meaning),
+            Some(Change::Variable(file, name, meaning)) => self.take_variable(file, name, meaning),
+            Some(Change::Unit(file, column, unit)) => import.set_unit(file, column, &unit),
         }
         ui.request_repaint();
     }
 }
 
-fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
-    let of_file =
-        |(file, inspected): (usize, &InspectedFile)| std::iter::once(Line::File(file)).chain(lines_of(file, inspected));
-    let lines: Vec<Line> = draft.files.iter().enumerate().flat_map(of_file).collect();
+fn table_ui(ui: &mut Ui, import: &Import, change: &Cell<Option<Change>>) {
+    let files = import.files.iter().enumerate();
+    let lines = Vec::from_iter(files.flat_map(|(number, file)| lines_of(number, file)));
     let palette = Theme::of(ui).palette;
-    let change = Cell::new(None);
-    let request = |found: Option<Change>| {
-        if found.is_some() {
-            change.set(found);
-        }
-    };
     let row = |place: usize| match lines[place] {
-        Line::File(file) => file_row(draft, file, &palette, &request),
-        Line::Variable(file, variable) => variable_row(draft, (file, variable), &palette, &request),
-        Line::Column(file, column) => column_row(draft, (file, column), &palette, &request),
+        Line::File(number, file) => {
+            let name = file_name(&file.path);
+            let of = format!("all columns of {name}");
+            let change_to = move |meaning| Change::Meaning(number, 0..file.meanings.len(), meaning);
+            let size = counted(file.rows, "row");
+            heading(TableCell::new(name).strong(true), (of, "set all…", ""), size, &palette, change, change_to)
+        }
+        Line::Variable(number, variable) => {
+            let Variable { name, shape, columns } = variable;
+            let is_left_out = columns.is_empty();
+            let change_to = move |meaning| match is_left_out {
+                true => Change::Variable(number, name.clone(), meaning),
+                false => Change::Meaning(number, columns.clone(), meaning),
+            };
+            let (text, hint, colour) = if is_left_out {
+                let hint = "Left out, because its rows are not the samples. Choose its meaning to make its rows the samples.";
+                ("left out", hint, palette.dim)
+            } else {
+                ("set all…", "", palette.text)
+            };
+            let cell = TableCell::new(name.clone()).colour(colour);
+            let of = format!("variable {name}");
+            heading(cell, (of, text, hint), shape.clone(), &palette, change, change_to)
+        }
+        Line::Column(file, column) => column_row(import, (file, column), palette, change),
     };
     let table = TableView::new("columns", &COLUMNS).row_height(ROW_HEIGHT);
     table.show(ui, lines.len(), row);
-    change.take()
 }
 
-/// Lines of the columns of a file; those of a variable follow its heading, which a variable with one column does not need.
-fn lines_of(file: usize, inspected: &InspectedFile) -> Vec<Line> {
-    let variables = &inspected.variables;
-    let mut lines = Vec::new();
-    for column in 0..inspected.meanings.len() {
-        let starts =
-            |(_, variable): &(usize, &Variable)| variable.columns.start == column && variable.columns.len() > 1;
-        lines.extend(
-            variables
-                .iter()
-                .enumerate()
-                .find(starts)
-                .map(|(place, _)| Line::Variable(file, place)),
-        );
-        lines.push(Line::Column(file, column));
+/// Lines of a file; those of a variable follow its heading, which a variable with one column does not need.
+fn lines_of(number: usize, file: &InspectedFile) -> Vec<Line<'_>> {
+    let mut lines = vec![Line::File(number, file)];
+    for column in 0..file.meanings.len() {
+        let starts = |variable: &&Variable| variable.columns.start == column && variable.columns.len() > 1;
+        let variable = file.variables.iter().find(starts);
+        lines.extend(variable.map(|variable| Line::Variable(number, variable)));
+        lines.push(Line::Column(number, column));
     }
-    let left_out = variables
-        .iter()
-        .enumerate()
-        .filter(|(_, variable)| variable.columns.is_empty());
-    lines.extend(left_out.map(|(place, _)| Line::Variable(file, place)));
+    let left_out = file.variables.iter().filter(|variable| variable.columns.is_empty());
+    lines.extend(left_out.map(|variable| Line::Variable(number, variable)));
     lines
 }
 
-/// The heading of a variable with its shape and a choice for all of its columns. Choosing one that is left out makes its rows
-/// the samples.
-fn variable_row<'a>(
-    draft: &'a Draft,
-    (file, variable): (usize, usize),
+/// The heading of a file or a variable, with its size and a choice for all of its columns.
+fn heading<'a>(
+    name: TableCell<'a>,
+    (of, text, hint): (String, &'static str, &'static str),
+    size: String,
     palette: &Palette,
-    request: &'a dyn Fn(Option<Change>),
+    change: &'a Cell<Option<Change>>,
+    change_to: impl Fn(Meaning) -> Change + 'a,
 ) -> TableRow<'a> {
-    let inspected = &draft.files[file];
-    let Variable { name, shape, columns } = &inspected.variables[variable];
-    let is_left_out = columns.is_empty();
     let of_all = move |ui: &mut Ui| {
-        let label = format!("Meaning of variable {name}");
-        let combo = ComboBox::from_id_salt(("variable", file, variable))
-            .selected_text(if is_left_out { "left out" } else { "set all…" })
-            .width(MEANING_WIDTH - space(3));
-        let shown = combo.show_ui(ui, |ui| {
-            for meaning in [Meaning::Input, Meaning::Target, Meaning::Unused] {
-                let is_offered = meaning != Meaning::Unused || !is_left_out;
-                if is_offered && ui.selectable_label(false, format!("all {meaning}")).clicked() {
-                    request(Some(Change::Variable(file, variable, meaning)));
-                }
-            }
-        });
-        let response = shown.response;
-        response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
-        if is_left_out {
-            let rows = inspected.rows;
-            response.on_hover_text(format!(
-                "Left out, because a sample is one of {rows} rows. Choose its meaning to make its rows the samples."
-            ));
+        let options = [Meaning::Input, Meaning::Target, Meaning::Unused].map(|meaning| (meaning, format!("all {meaning}")));
+        // Choosing nothing does not make the rows of a variable the samples.
+        let offered = if hint.is_empty() { &options[..] } else { &options[..2] };
+        if let Some(meaning) = combo_ui(ui, &of, RichText::new(text), offered, None, hint) {
+            change.set(Some(change_to(meaning)));
         }
     };
-    let colour = if is_left_out { palette.dim } else { palette.text };
-    let mut cells = vec![TableCell::new(name.clone()).colour(colour), TableCell::controls(of_all)];
+    let mut cells = vec![name, TableCell::controls(of_all)];
     cells.extend((0..4).map(|_| TableCell::default()));
-    cells.push(TableCell::new(shape.clone()).colour(palette.dim));
-    TableRow::new(cells)
-}
-
-/// The heading of a file, with a choice for all of its columns.
-fn file_row<'a>(draft: &'a Draft, file: usize, palette: &Palette, request: &'a dyn Fn(Option<Change>)) -> TableRow<'a> {
-    let inspected = &draft.files[file];
-    let name = file_name(&inspected.path);
-    let of_all = move |ui: &mut Ui| {
-        let label = format!("Meaning of all columns of {}", file_name(&inspected.path));
-        let combo = ComboBox::from_id_salt(("all", file))
-            .selected_text("set all…")
-            .width(MEANING_WIDTH - space(3));
-        let shown = combo.show_ui(ui, |ui| {
-            for meaning in [Meaning::Input, Meaning::Target, Meaning::Unused] {
-                if ui.selectable_label(false, format!("all {meaning}")).clicked() {
-                    request(Some(Change::All(file, meaning)));
-                }
-            }
-        });
-        shown
-            .response
-            .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
-    };
-    let rows = counted(inspected.rows, "row");
-    let mut cells = vec![TableCell::new(name).strong(true), TableCell::controls(of_all)];
-    cells.extend((0..4).map(|_| TableCell::default()));
-    cells.push(TableCell::new(rows).colour(palette.dim));
+    cells.push(TableCell::new(size).colour(palette.dim));
     TableRow::new(cells)
 }
 
 fn column_row<'a>(
-    draft: &'a Draft,
+    import: &'a Import,
     (file, column): (usize, usize),
-    palette: &Palette,
-    request: &'a dyn Fn(Option<Change>),
+    palette: Palette,
+    change: &'a Cell<Option<Change>>,
 ) -> TableRow<'a> {
-    let palette = *palette;
-    let inspected = &draft.files[file];
-    let summary = &inspected.columns[column];
-    let name = Rc::new(inspected.full_name(column));
-    let meaning = inspected.meanings[column];
-    let colour = if meaning == Meaning::Unused {
-        palette.dim
+    let inspected = &import.files[file];
+    let (summary, meaning) = (&inspected.columns[column], inspected.meanings[column]);
+    let name = inspected.full_name(column);
+    let (colour, bars) = if meaning == Meaning::Unused {
+        (palette.dim, palette.line)
     } else {
-        palette.text
+        (palette.text, palette.dim)
     };
-    let of = || Rc::clone(&name);
-    let name_cell = {
-        let name = of();
-        move |ui: &mut Ui| {
-            ui.add_space(space(2));
-            ui.add(Label::new(RichText::new(&*name).color(colour)).truncate());
+    let of = |what: &str| format!("{what} {name}");
+    let (of_unit, of_histogram) = (of("Unit of"), of("Histogram of"));
+    let of_meaning = name.clone();
+    let range = summary.min.zip(summary.max);
+    let exact = range.map_or_else(String::new, |(min, max)| format!("{min} to {max}"));
+    let range = range.map_or_else(|| "–".to_owned(), |(min, max)| range_text(min, max));
+    let range = figure(range, of("Range of"), exact, colour);
+    let missing = missing_text(summary.missing, inspected.rows);
+    let rows = format!("{} of {} rows", summary.missing, inspected.rows);
+    let missing = figure(missing, of("Missing in"), rows, colour);
+    let name_cell = move |ui: &mut Ui| {
+        ui.add_space(space(2));
+        ui.add(Label::new(RichText::new(name).color(colour)).truncate());
+    };
+    let meaning_cell = move |ui: &mut Ui| {
+        let text = RichText::new(meaning.to_string()).color(colour);
+        let options = Vec::from_iter(Meaning::ALL.iter().map(|&option| (option, option.to_string())));
+        if let Some(picked) = combo_ui(ui, &of_meaning, text, &options, Some(meaning), "") {
+            change.set(Some(Change::Meaning(file, column..column + 1, picked)));
         }
     };
-    let meaning_cell = {
-        let name = of();
-        move |ui: &mut Ui| {
-            let picked = meaning_ui(ui, &name, meaning, MEANING_WIDTH - space(3));
-            request(picked.map(|meaning| Change::Meaning(file, column, meaning)));
+    let unit_cell = move |ui: &mut Ui| {
+        if matches!(meaning, Meaning::Input | Meaning::Target)
+            && let Some(unit) = unit_ui(ui, of_unit, &import.unit(file, column))
+        {
+            change.set(Some(Change::Unit(file, column, unit)));
         }
     };
-    let unit_cell = {
-        let name = of();
-        move |ui: &mut Ui| {
-            if matches!(meaning, Meaning::Input | Meaning::Target) {
-                let unit = unit_ui(ui, &name, &draft.unit(file, column), UNIT_WIDTH - space(4));
-                request(unit.map(|unit| Change::Unit(file, column, unit)));
-            }
-        }
-    };
-    let histogram_cell = {
-        let name = of();
-        move |ui: &mut Ui| {
-            let rect = ui.max_rect().shrink2(vec2(0.0, space(1)));
-            let bars = if meaning == Meaning::Unused {
-                palette.line
-            } else {
-                palette.dim
-            };
-            paint_histogram(ui, rect, &summary.histogram, bars);
-            let response = ui.interact(rect, ui.scope_id().with("histogram"), Sense::hover());
-            let label = format!("Histogram of {name}");
-            response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
-            response.on_hover_text("Number of rows in each sixteenth of the range.");
-        }
-    };
-    let range_cell = {
-        let name = of();
-        move |ui: &mut Ui| {
-            let ends = summary.min.zip(summary.max);
-            let texts = ends.map_or_else(|| vec!["–".to_owned()], |(min, max)| range_texts(min, max));
-            let exact = ends.map(|(min, max)| format!("{min} to {max}"));
-            let response = figure_ui(ui, &texts, &format!("Range of {name}"), colour);
-            if let Some(exact) = exact {
-                response.on_hover_text(exact);
-            }
-        }
-    };
-    let missing_cell = {
-        let name = of();
-        move |ui: &mut Ui| {
-            let texts = missing_texts(summary.missing, inspected.rows);
-            let response = figure_ui(ui, &texts, &format!("Missing in {name}"), colour);
-            response.on_hover_text(format!("{} of {} rows", summary.missing, inspected.rows));
-        }
+    let histogram_cell = move |ui: &mut Ui| {
+        let rect = ui.max_rect().shrink2(vec2(0.0, space(1)));
+        paint_histogram(ui, rect, &summary.histogram, bars);
+        let response = ui.interact(rect, ui.scope_id().with("histogram"), Sense::hover());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &of_histogram));
+        response.on_hover_text("Number of rows in each sixteenth of the range.");
     };
     let remark_cell = move |ui: &mut Ui| {
-        let shape = || {
-            let mut variables = inspected.variables.iter();
-            let single = variables.find(|variable| variable.columns == (column..column + 1))?;
-            Some((single.shape.clone(), false))
-        };
-        if let Some((text, is_bad)) = remark(summary, column).or_else(shape) {
-            let colour = if is_bad && meaning != Meaning::Unused {
-                palette.warning
-            } else {
-                palette.dim
-            };
+        let mut variables = inspected.variables.iter();
+        let single = variables.find(|variable| variable.columns == (column..column + 1));
+        let (remark, shape) = (remark(summary, column), single.map(|variable| variable.shape.clone()));
+        let is_bad = remark.is_some() && meaning != Meaning::Unused;
+        if let Some(text) = remark.or(shape) {
+            let colour = if is_bad { palette.warning } else { palette.dim };
             ui.add(Label::new(RichText::new(text).size(type_size().note).color(colour)).truncate());
         }
     };
@@ -282,37 +205,38 @@ fn column_row<'a>(
         TableCell::controls(meaning_cell),
         TableCell::controls(unit_cell),
         TableCell::controls(histogram_cell),
-        TableCell::controls(range_cell),
-        TableCell::controls(missing_cell),
+        TableCell::controls(range),
+        TableCell::controls(missing),
         TableCell::controls(remark_cell),
     ])
 }
 
-/// The choice of a meaning. Returns the one newly picked.
-pub(super) fn meaning_ui(ui: &mut Ui, name: &str, meaning: Meaning, width: f32) -> Option<Meaning> {
+/// A choice of the meaning `of` something. Returns the one newly picked.
+fn combo_ui(
+    ui: &mut Ui,
+    of: &str,
+    text: RichText,
+    options: &[(Meaning, String)],
+    shown: Option<Meaning>,
+    hint: &str,
+) -> Option<Meaning> {
     let mut picked = None;
-    let palette = Theme::of(ui).palette;
-    let text = RichText::new(meaning.to_string()).color(if meaning == Meaning::Unused {
-        palette.dim
-    } else {
-        palette.text
-    });
-    let combo = ComboBox::from_id_salt(name).selected_text(text).width(width);
-    let shown = combo.show_ui(ui, |ui| {
-        for &option in Meaning::ALL {
-            let choice = ui.selectable_label(option == meaning, option.to_string());
-            if choice.on_hover_text(explanation(option)).clicked() && option != meaning {
-                picked = Some(option);
+    let value = text.text().to_owned();
+    let combo = ComboBox::from_id_salt(of).selected_text(text).width(MEANING_WIDTH);
+    let combo = combo.show_ui(ui, |ui| {
+        for (option, text) in options {
+            let choice = ui.selectable_label(Some(*option) == shown, text);
+            if choice.on_hover_text(explanation(*option)).clicked() && Some(*option) != shown {
+                picked = Some(*option);
             }
         }
     });
-    let label = format!("Meaning of {name}");
-    let value = meaning.to_string();
-    shown
-        .response
-        .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
-    ui.ctx()
-        .accesskit_node_builder(shown.response.id, |node| node.set_value(value));
+    let response = combo.response;
+    response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, format!("Meaning of {of}")));
+    ui.ctx().accesskit_node_builder(response.id, |node| node.set_value(value));
+    if !hint.is_empty() {
+        response.on_hover_text(hint);
+    }
     picked
 }
 
@@ -329,13 +253,12 @@ fn explanation(meaning: Meaning) -> &'static str {
 
 /// The unit, editable in place. Typing takes effect at once, because a row that scrolls out of view does not report the end
 /// of editing. Returns the unit if it has changed.
-pub(super) fn unit_ui(ui: &mut Ui, name: &str, unit: &str, width: f32) -> Option<String> {
-    let id = ui.scope_id().with(("unit", name));
+fn unit_ui(ui: &mut Ui, label: String, unit: &str) -> Option<String> {
+    let id = ui.scope_id().with(&label);
     // As typed, including trailing spaces, which are not part of the unit.
     let kept: Option<String> = ui.data(|data| data.get_temp(id));
     let mut typed = kept.clone().unwrap_or_else(|| unit.to_owned());
-    let edit = ui.add(TextEdit::singleline(&mut typed).id(id).desired_width(width));
-    let label = format!("Unit of {name}");
+    let edit = ui.add(TextEdit::singleline(&mut typed).id(id).desired_width(UNIT_WIDTH - space(2)));
     ui.ctx().accesskit_node_builder(edit.id, |node| node.set_label(label));
     if !edit.has_focus() && kept.is_some() {
         ui.data_mut(|data| data.remove::<String>(id));
@@ -345,99 +268,79 @@ pub(super) fn unit_ui(ui: &mut Ui, name: &str, unit: &str, width: f32) -> Option
     (edit.changed() && typed.trim() != unit).then_some(typed)
 }
 
-/// A figure at the right of its cell: the first of `texts` that fits, because a truncated figure would be wrong.
-/// `label` names it.
-pub(super) fn figure_ui(ui: &mut Ui, texts: &[String], label: &str, colour: Color32) -> Response {
-    let rect: Rect = ui.max_rect();
-    let room = rect.width() - space(2);
-    let mut shown = None;
-    for text in texts {
-        let galley = ui
-            .painter()
-            .layout_no_wrap(text.clone(), FontId::proportional(type_size().note), colour);
-        let has_room = galley.size().x <= room;
-        shown = Some((galley, text));
-        if has_room {
-            break;
-        }
+/// A figure at the right of its cell, named by `label`.
+fn figure(text: String, label: String, hint: String, colour: Color32) -> impl FnOnce(&mut Ui) {
+    move |ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let shown = ui.label(RichText::new(&text).size(type_size().note).color(colour));
+            shown.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{label}: {text}")));
+            shown.on_hover_text(hint);
+        });
     }
-    let response = ui.interact(rect, ui.scope_id().with("figure"), Sense::hover());
-    if let Some((galley, text)) = shown {
-        response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{label}: {text}")));
-        let at = rect.right_center() - vec2(space(1) + galley.size().x, 0.5 * galley.size().y);
-        ui.painter().galley(at, galley, colour);
-    }
-    response
 }
 
-/// Returns texts of the ends of a range, the most exact first: with enough decimals to distinguish them, with fewer, and
-/// rounded, with the width if they would look the same.
-pub(super) fn range_texts(min: f64, max: f64) -> Vec<String> {
+/// Maximum number of characters of a figure, because a truncated one would be wrong.
+const MAX_CHARACTERS: [usize; 2] = [26, 6];
+
+/// Returns the ends of a range: with enough decimals to distinguish them or, if that is too long, with fewer, or rounded, with the
+/// width if they would look the same.
+fn range_text(min: f64, max: f64) -> String {
     let span = max - min;
-    let largest = min.abs().max(max.abs());
     let number = |value: f64| format_number(value).replace('-', "−");
-    let has_decimals = (1e-6..1e12).contains(&span) && largest < 1e12;
     if min == max {
-        return vec![number(min)];
+        return number(min);
     }
-    let mut texts = Vec::new();
-    if has_decimals {
+    if (1e-6..1e12).contains(&span) && min.abs().max(max.abs()) < 1e12 {
         for step in [span / 100.0, span / 10.0] {
-            texts.push(format!("{} – {}", tick_text(min, step), tick_text(max, step)));
+            let text = format!("{} – {}", tick_text(min, step), tick_text(max, step));
+            if text.chars().count() <= MAX_CHARACTERS[0] {
+                return text;
+            }
         }
     }
-    let ends = [number(min), number(max)];
-    texts.push(if ends[0] == ends[1] {
-        format!("{}, width {}", ends[0], number(span))
-    } else {
-        ends.join(" – ")
-    });
-    texts
-}
-
-/// Returns texts of the number of rows with a missing cell: the number, and its share for narrow cells.
-pub(super) fn missing_texts(missing: usize, rows: usize) -> Vec<String> {
-    if missing == 0 {
-        return vec!["–".to_owned()];
+    match [min, max].map(number) {
+        [min, max] if min == max => format!("{min}, width {}", number(span)),
+        ends => ends.join(" – "),
     }
-    let percent = 100.0 * missing as f64 / rows.max(1) as f64;
-    vec![missing.to_string(), format!("{} %", format_number(percent))]
 }
 
-/// Returns a remark on an unusual column, and true if the column cannot be used as it is.
-pub(super) fn remark(summary: &ColumnSummary, column: usize) -> Option<(String, bool)> {
+/// Returns the number of rows with a missing cell or, if that is too long, its share.
+fn missing_text(missing: usize, rows: usize) -> String {
+    let count = missing.to_string();
+    if missing == 0 {
+        "–".to_owned()
+    } else if count.len() <= MAX_CHARACTERS[1] {
+        count
+    } else {
+        format!("{} %", format_number(100.0 * missing as f64 / rows.max(1) as f64))
+    }
+}
+
+/// Returns a remark on a column that cannot be used as it is.
+fn remark(summary: &ColumnSummary, column: usize) -> Option<String> {
     if let Some((line, text)) = &summary.first_text {
         let others = match summary.texts {
             1 => String::new(),
             texts => format!(", and {} other cells", texts - 1),
         };
-        return Some((
-            format!("line {line}, column {}: '{text}' is not a number{others}", column + 1),
-            true,
-        ));
+        let place = format!("line {line}, column {}", column + 1);
+        return Some(format!("{place}: '{text}' is not a number{others}"));
     }
     if summary.kind == ColumnKind::Empty {
-        return Some(("empty".to_owned(), true));
+        return Some("empty".to_owned());
     }
     if summary.is_constant {
-        return Some(("constant: carries no information".to_owned(), true));
+        return Some("constant: carries no information".to_owned());
     }
-    summary
-        .duplicate_of
-        .as_ref()
-        .map(|other| (format!("same as {other}"), true))
+    let other = summary.duplicate_of.as_ref();
+    other.map(|other| format!("same as {other}"))
 }
 
 /// Paints a small histogram over `rect`, as high as its fullest bar.
-pub(super) fn paint_histogram(ui: &Ui, rect: Rect, bars: &[usize], colour: Color32) {
-    let Some(most) = bars.iter().copied().max().filter(|most| *most > 0) else {
-        return;
-    };
+fn paint_histogram(ui: &Ui, rect: Rect, bars: &[usize], colour: Color32) {
+    let most = bars.iter().copied().max().unwrap_or(0).max(1);
     let width = rect.width() / bars.len() as f32;
-    for (place, &count) in bars.iter().enumerate() {
-        if count == 0 {
-            continue;
-        }
+    for (place, &count) in bars.iter().enumerate().filter(|(_, count)| **count > 0) {
         let left = rect.left() + width * place as f32;
         // One sample among thousands is still visible.
         let height = (rect.height() * count as f32 / most as f32).max(1.0);
@@ -452,7 +355,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_ends_of_a_range_differ_where_its_numbers_do() {
+    fn the_ends_of_a_range_differ_where_its_numbers_do_and_fit_their_column() {
         for (min, max, text) in [
             (-108.0, 288.4, "−108 – 288"),
             (142.95, 143.0, "142.9500 – 143.0000"),
@@ -461,24 +364,14 @@ mod tests {
             (4.0, 4.0, "4.00"),
             (0.0, 1e-9, "0 – 1.00e−9"),
             (-1e300, 1e300, "−1.00e300 – 1.00e300"),
-        ] {
-            assert_eq!(range_texts(min, max)[0], text);
-        }
-    }
-
-    #[test]
-    fn every_range_has_a_short_text_that_is_right() {
-        for (min, max, last) in [
-            (314.999_969, 315.0, "315, width 3.10e−5"),
-            (-314.999_969, -314.9, "−315, width 0.100"),
             (1e11, 1e11 + 1.0 / 1024.0, "1.00e11, width 9.77e−4"),
             (0.0, f64::MIN_POSITIVE, "0 – 2.23e−308"),
             (-f64::MAX, f64::MAX, "−1.80e308 – 1.80e308"),
         ] {
-            let texts = range_texts(min, max);
-            assert_eq!(texts.last().unwrap(), last);
+            assert_eq!(range_text(min, max), text);
         }
-        assert_eq!(missing_texts(0, 10), ["–"]);
-        assert_eq!(missing_texts(123_456_789, 200_000_000), ["123456789", "61.7 %"]);
+        assert_eq!(missing_text(0, 10), "–");
+        assert_eq!(missing_text(123_456, 200_000_000), "123456");
+        assert_eq!(missing_text(123_456_789, 200_000_000), "61.7 %");
     }
 }
