@@ -3,31 +3,33 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
-    dataset::{Dataset, Seed},
-    evaluation::recorded::{channel_remarks, extrapolation},
+    dataset::{Dataset, Seed, SplitBy},
+    evaluation::{
+        TrainingSize,
+        recorded::{channel_remarks, extrapolation},
+    },
+    text::counted,
 };
 use decoupler_files::{
-    export::describe_positions,
-    import::{Cure, Dropped, FileReport, ImportError, Plan, Recording},
+    export::{describe_positions, format_number},
+    import::{Cure, FileReport, ImportError, Plan, Recording},
 };
 
-use crate::window::job::{Background, JobError, Report, Wake};
+use super::{import::file_name, options::bias};
+use crate::window::{
+    job::{Background, JobError, Report, Wake},
+    shared::sentence,
+};
 
 /// Outcome of an import.
 #[derive(Debug)]
 pub(super) struct Checked {
     /// Number of samples for training, validation and test.
     pub(super) samples: [usize; 3],
-    /// Numbers of inputs, with those from the past, and targets.
-    pub(super) channels: (usize, usize),
-    /// Number of rows of the files, dropped ones included.
-    pub(super) rows: usize,
-    /// Rows that are not samples, by reason.
-    pub(super) dropped: Vec<Dropped>,
-    /// The files, and how they are joined.
-    pub(super) files: Vec<FileReport>,
-    /// Positions of targets, as text.
-    pub(super) positions: Option<String>,
+    /// Size of a training with one network.
+    pub(super) size: TrainingSize,
+    /// What became of the files and their rows, as sentences.
+    pub(super) facts: Vec<String>,
     /// Warnings for the user.
     pub(super) warnings: Vec<String>,
 }
@@ -93,20 +95,48 @@ fn check(plan: &Plan, seed: Seed, report: &Report<Result<Checked, String>>) -> R
     let divided = plan.divide(&recording, test_recording.as_ref(), seed);
     let (split, test) = divided.map_err(|error| in_window(&error))?;
     let recordings = || std::iter::once(&recording).chain(&test_recording);
-    let mut warnings = Recording::warnings_of(recordings());
-    let (inputs, targets) = (recording.problem.features(), &recording.problem.targets);
-    warnings.extend(channel_remarks(&recording.set, plan.division.by, &inputs, targets));
+    let (problem, by) = (&recording.problem, plan.division.by);
+    let (inputs, targets) = (problem.features(), &problem.targets);
+    let is_random = plan.test.is_none() && by == SplitBy::Random;
+    let mut warnings = Vec::from_iter(is_random.then(|| bias(by).to_owned()));
+    warnings.extend(Recording::warnings_of(recordings()));
+    warnings.extend(channel_remarks(&recording.set, by, &inputs, targets));
     warnings.extend(extrapolation(&split.training, &test, &inputs, targets).1);
+    let rows: usize = recordings().map(|recording| recording.rows).sum();
+    let joins = recordings().flat_map(|recording| &recording.files).filter_map(joined);
+    let dropped = recordings().flat_map(|recording| &recording.dropped);
+    let dropped = dropped.map(|dropped| {
+        let (count, reason, line) = (dropped.rows, &dropped.reason, dropped.first_line);
+        format!("{count} of {rows} rows dropped: {reason} (first on line {line}).")
+    });
+    let positions = describe_positions(&problem.positions).map(|positions| sentence(&positions));
+    let facts = joins.chain(dropped).chain(positions).collect();
+    let training = &split.training;
     let validation = split.validation.as_ref().map_or(0, Dataset::samples);
     Ok(Checked {
-        samples: [split.training.samples(), validation, test.samples()],
-        channels: (split.training.readings().ncols(), split.training.targets().ncols()),
-        rows: recordings().map(|recording| recording.rows).sum(),
-        dropped: recordings().flat_map(|recording| recording.dropped.clone()).collect(),
-        files: recordings().flat_map(|recording| recording.files.clone()).collect(),
-        positions: describe_positions(&recording.problem.positions),
+        samples: [training.samples(), validation, test.samples()],
+        size: TrainingSize {
+            samples: training.samples(),
+            inputs: training.readings().ncols(),
+            targets: training.targets().ncols(),
+            networks: 1,
+        },
+        facts,
         warnings,
     })
+}
+
+/// Returns a sentence on how a file is joined to the first, if it is joined by time.
+fn joined(file: &FileReport) -> Option<String> {
+    let (join, name) = (file.join?, file_name(&file.path));
+    let offset = join.median_offset.map_or_else(String::new, |offset| {
+        format!(", median offset {}", format_number(offset.abs()))
+    });
+    let (limit, lost) = (format_number(join.limit), counted(join.without_partner, "row"));
+    let unused = join.unused;
+    Some(format!(
+        "{name} is joined by time within {limit}{offset}; {lost} without partner, {unused} of its rows unused."
+    ))
 }
 
 /// Returns an error of the import, with the remedy in terms of the window.

@@ -10,21 +10,17 @@ use decoupler_files::{
     figure::tick_text,
     import::{ColumnKind, ColumnSummary, InspectedFile, Meaning, Variable},
 };
-use eframe::egui::{
-    Align, Color32, ComboBox, Label, Layout, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2,
-    vec2,
-};
+use eframe::egui::{Color32, ComboBox, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2, vec2};
 
 use super::{
     editor::RecordingEditor,
     import::{Import, file_name},
 };
 use crate::window::{
-    theme::{Palette, Theme, space, type_size},
+    theme::{Palette, Theme, space},
     widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView},
 };
 
-const ROW_HEIGHT: f32 = space(7);
 const MEANING_WIDTH: f32 = space(23);
 const UNIT_WIDTH: f32 = space(13);
 const COLUMNS: [TableColumn<'_>; 7] = [
@@ -36,16 +32,10 @@ const COLUMNS: [TableColumn<'_>; 7] = [
     TableColumn::figure("missing").width(ColumnWidth::Points(space(12))),
     TableColumn::text("remarks").width(ColumnWidth::Rest),
 ];
+/// Meanings of all columns of a file or a variable.
+const OF_ALL: [Meaning; 3] = [Meaning::Input, Meaning::Target, Meaning::Unused];
 
-/// A line of the table: a file and its place in the list of files, a variable or a column in it.
-#[derive(Clone, Copy)]
-enum Line<'a> {
-    File(usize, &'a InspectedFile),
-    Variable(usize, &'a Variable),
-    Column(usize, usize),
-}
-
-/// A change made by the user.
+/// A change made by the user to columns of the file with a number.
 enum Change {
     Meaning(usize, Range<usize>, Meaning),
     /// The rows of a variable become the samples, and its columns get a meaning.
@@ -53,13 +43,32 @@ enum Change {
     Unit(usize, usize, String),
 }
 
+/// Where a row of the table leaves the change.
+type Changed = Cell<Option<Change>>;
+
+/// A row of the table: a file, or a variable or column of one.
+#[derive(Clone, Copy)]
+enum Line<'a> {
+    File,
+    Variable(&'a Variable),
+    Column(usize),
+}
+
 impl RecordingEditor {
     /// Shows the columns of all files; changes their meanings and units.
     pub(super) fn columns_table_ui(&mut self, ui: &mut Ui, is_busy: bool) {
         let Some(import) = &mut self.import else { return };
-        let change = Cell::new(None);
-        ui.add_enabled_ui(!is_busy, |ui| table_ui(ui, import, &change));
-        match change.take() {
+        let files = import.files.iter().enumerate();
+        let lines = Vec::from_iter(files.flat_map(|(number, file)| lines_of(file).map(move |line| (number, line))));
+        let (palette, changed) = (Theme::of(ui).palette, Changed::default());
+        ui.add_enabled_ui(!is_busy, |ui| {
+            let table = TableView::new("columns", &COLUMNS).row_height(space(7));
+            table.show(ui, lines.len(), |place| match lines[place] {
+                (file, Line::Column(column)) => column_row(import, (file, column), palette, &changed),
+                (file, heading) => heading_row(&import.files[file], (file, heading), palette, &changed),
+            });
+        });
+        match changed.take() {
             None => return,
             Some(Change::Meaning(file, columns, meaning)) => import.set_meanings(file, columns, meaning),
             Some(Change::Variable(file, name, meaning)) => self.take_variable(file, name, meaning),
@@ -69,118 +78,91 @@ impl RecordingEditor {
     }
 }
 
-fn table_ui(ui: &mut Ui, import: &Import, change: &Cell<Option<Change>>) {
-    let files = import.files.iter().enumerate();
-    let lines = Vec::from_iter(files.flat_map(|(number, file)| lines_of(number, file)));
-    let palette = Theme::of(ui).palette;
-    let row = |place: usize| match lines[place] {
-        Line::File(number, file) => {
-            let name = file_name(&file.path);
-            let of = format!("all columns of {name}");
-            let change_to = move |meaning| Change::Meaning(number, 0..file.meanings.len(), meaning);
-            let size = counted(file.rows, "row");
-            heading(TableCell::new(name).strong(true), (of, "set all…", ""), size, &palette, change, change_to)
-        }
-        Line::Variable(number, variable) => {
-            let Variable { name, shape, columns } = variable;
-            let is_left_out = columns.is_empty();
-            let change_to = move |meaning| match is_left_out {
-                true => Change::Variable(number, name.clone(), meaning),
-                false => Change::Meaning(number, columns.clone(), meaning),
-            };
-            let (text, hint, colour) = if is_left_out {
-                let hint = "Left out, because its rows are not the samples. Choose its meaning to make its rows the samples.";
-                ("left out", hint, palette.dim)
-            } else {
-                ("set all…", "", palette.text)
-            };
-            let cell = TableCell::new(name.clone()).colour(colour);
-            let of = format!("variable {name}");
-            heading(cell, (of, text, hint), shape.clone(), &palette, change, change_to)
-        }
-        Line::Column(file, column) => column_row(import, (file, column), palette, change),
-    };
-    let table = TableView::new("columns", &COLUMNS).row_height(ROW_HEIGHT);
-    table.show(ui, lines.len(), row);
-}
-
-/// Lines of a file; those of a variable follow its heading, which a variable with one column does not need.
-fn lines_of(number: usize, file: &InspectedFile) -> Vec<Line<'_>> {
-    let mut lines = vec![Line::File(number, file)];
-    for column in 0..file.meanings.len() {
-        let starts = |variable: &&Variable| variable.columns.start == column && variable.columns.len() > 1;
-        let variable = file.variables.iter().find(starts);
-        lines.extend(variable.map(|variable| Line::Variable(number, variable)));
-        lines.push(Line::Column(number, column));
-    }
+/// Lines of a file. The columns of a variable follow its heading, which a variable with one column does not need.
+fn lines_of(file: &InspectedFile) -> impl Iterator<Item = Line<'_>> {
+    let columns = (0..file.meanings.len()).flat_map(|column| {
+        let starts = move |variable: &&Variable| variable.columns.start == column && variable.columns.len() > 1;
+        let variable = file.variables.iter().find(starts).map(Line::Variable);
+        variable.into_iter().chain([Line::Column(column)])
+    });
     let left_out = file.variables.iter().filter(|variable| variable.columns.is_empty());
-    lines.extend(left_out.map(|variable| Line::Variable(number, variable)));
-    lines
+    std::iter::once(Line::File)
+        .chain(columns)
+        .chain(left_out.map(Line::Variable))
 }
 
 /// The heading of a file or a variable, with its size and a choice for all of its columns.
-fn heading<'a>(
-    name: TableCell<'a>,
-    (of, text, hint): (String, &'static str, &'static str),
-    size: String,
-    palette: &Palette,
-    change: &'a Cell<Option<Change>>,
-    change_to: impl Fn(Meaning) -> Change + 'a,
+fn heading_row<'a>(
+    of: &'a InspectedFile,
+    (file, line): (usize, Line<'a>),
+    palette: Palette,
+    changed: &'a Changed,
 ) -> TableRow<'a> {
-    let of_all = move |ui: &mut Ui| {
-        let options = [Meaning::Input, Meaning::Target, Meaning::Unused].map(|meaning| (meaning, format!("all {meaning}")));
-        // Choosing nothing does not make the rows of a variable the samples.
-        let offered = if hint.is_empty() { &options[..] } else { &options[..2] };
-        if let Some(meaning) = combo_ui(ui, &of, RichText::new(text), offered, None, hint) {
-            change.set(Some(change_to(meaning)));
-        }
+    let (name, whole, size, columns) = match line {
+        Line::Variable(Variable { name, shape, columns }) => (name.clone(), "variable", shape.clone(), columns.clone()),
+        _ => (
+            file_name(&of.path),
+            "all columns of",
+            counted(of.rows, "row"),
+            0..of.meanings.len(),
+        ),
     };
-    let mut cells = vec![name, TableCell::controls(of_all)];
+    let is_left_out = columns.is_empty();
+    let (text, offered, colour) = if is_left_out {
+        ("left out", &OF_ALL[..2], palette.dim)
+    } else {
+        ("set all…", &OF_ALL[..], palette.text)
+    };
+    let is_file = matches!(line, Line::File);
+    let name_cell = TableCell::new(name.clone()).colour(colour).strong(is_file);
+    let combo = move |ui: &mut Ui| {
+        let options = Vec::from_iter(offered.iter().map(|meaning| (*meaning, format!("all {meaning}"))));
+        let Some(meaning) = combo_ui(ui, &format!("{whole} {name}"), text, &options, None) else {
+            return;
+        };
+        changed.set(Some(if is_left_out {
+            Change::Variable(file, name, meaning)
+        } else {
+            Change::Meaning(file, columns, meaning)
+        }));
+    };
+    let mut cells = vec![name_cell, TableCell::controls(combo)];
     cells.extend((0..4).map(|_| TableCell::default()));
-    cells.push(TableCell::new(size).colour(palette.dim));
+    let meaning = if is_left_out { LEFT_OUT } else { "" };
+    cells.push(TableCell::new(size).colour(palette.dim).meaning(meaning));
     TableRow::new(cells)
 }
+
+const LEFT_OUT: &str =
+    "Left out, because its rows are not the samples. Choose its meaning to make its rows the samples.";
 
 fn column_row<'a>(
     import: &'a Import,
     (file, column): (usize, usize),
     palette: Palette,
-    change: &'a Cell<Option<Change>>,
+    changed: &'a Changed,
 ) -> TableRow<'a> {
     let inspected = &import.files[file];
     let (summary, meaning) = (&inspected.columns[column], inspected.meanings[column]);
-    let name = inspected.full_name(column);
-    let (colour, bars) = if meaning == Meaning::Unused {
+    let is_unused = meaning == Meaning::Unused;
+    let (colour, bars) = if is_unused {
         (palette.dim, palette.line)
     } else {
         (palette.text, palette.dim)
     };
-    let of = |what: &str| format!("{what} {name}");
-    let (of_unit, of_histogram) = (of("Unit of"), of("Histogram of"));
-    let of_meaning = name.clone();
-    let range = summary.min.zip(summary.max);
-    let exact = range.map_or_else(String::new, |(min, max)| format!("{min} to {max}"));
-    let range = range.map_or_else(|| "–".to_owned(), |(min, max)| range_text(min, max));
-    let range = figure(range, of("Range of"), exact, colour);
-    let missing = missing_text(summary.missing, inspected.rows);
-    let rows = format!("{} of {} rows", summary.missing, inspected.rows);
-    let missing = figure(missing, of("Missing in"), rows, colour);
-    let name_cell = move |ui: &mut Ui| {
-        ui.add_space(space(2));
-        ui.add(Label::new(RichText::new(name).color(colour)).truncate());
-    };
+    let name = inspected.full_name(column);
+    let names = [name.clone(), format!("Unit of {name}"), format!("Histogram of {name}")];
+    let [of_meaning, of_unit, of_histogram] = names;
     let meaning_cell = move |ui: &mut Ui| {
-        let text = RichText::new(meaning.to_string()).color(colour);
-        let options = Vec::from_iter(Meaning::ALL.iter().map(|&option| (option, option.to_string())));
-        if let Some(picked) = combo_ui(ui, &of_meaning, text, &options, Some(meaning), "") {
-            change.set(Some(Change::Meaning(file, column..column + 1, picked)));
-        }
+        let options = Vec::from_iter(Meaning::ALL.iter().map(|option| (*option, option.to_string())));
+        let picked = combo_ui(ui, &of_meaning, &meaning.to_string(), &options, Some(meaning));
+        let change = picked.map(|picked| Change::Meaning(file, column..column + 1, picked));
+        changed.set(change.or(changed.take()));
     };
     let unit_cell = move |ui: &mut Ui| {
-        if matches!(meaning, Meaning::Input | Meaning::Target)
-            && let Some(unit) = unit_ui(ui, of_unit, &import.unit(file, column))
-        {
-            change.set(Some(Change::Unit(file, column, unit)));
+        if matches!(meaning, Meaning::Input | Meaning::Target) {
+            let unit = unit_ui(ui, of_unit, &import.unit(file, column));
+            changed.set(unit.map(|unit| Change::Unit(file, column, unit)).or(changed.take()));
         }
     };
     let histogram_cell = move |ui: &mut Ui| {
@@ -190,39 +172,49 @@ fn column_row<'a>(
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &of_histogram));
         response.on_hover_text("Number of rows in each sixteenth of the range.");
     };
-    let remark_cell = move |ui: &mut Ui| {
-        let mut variables = inspected.variables.iter();
-        let single = variables.find(|variable| variable.columns == (column..column + 1));
-        let (remark, shape) = (remark(summary, column), single.map(|variable| variable.shape.clone()));
-        let is_bad = remark.is_some() && meaning != Meaning::Unused;
-        if let Some(text) = remark.or(shape) {
-            let colour = if is_bad { palette.warning } else { palette.dim };
-            ui.add(Label::new(RichText::new(text).size(type_size().note).color(colour)).truncate());
-        }
+    let range = summary.min.zip(summary.max);
+    let range = range.map_or_else(|| "–".to_owned(), |(min, max)| range_text(min, max));
+    let missing = match summary.missing {
+        0 => "–".to_owned(),
+        missing => missing.to_string(),
     };
-    TableRow::new([
-        TableCell::controls(name_cell),
+    let mut variables = inspected.variables.iter();
+    let shape = variables
+        .find(|variable| variable.columns == (column..column + 1))
+        .map(|variable| variable.shape.clone());
+    let remark = remark(summary, column);
+    let is_bad = remark.is_some() && !is_unused;
+    let remark_colour = if is_bad { palette.warning } else { palette.dim };
+    let row = TableRow::new([
+        TableCell::new(name.clone()).colour(colour),
         TableCell::controls(meaning_cell),
         TableCell::controls(unit_cell),
         TableCell::controls(histogram_cell),
-        TableCell::controls(range),
-        TableCell::controls(missing),
-        TableCell::controls(remark_cell),
-    ])
+        TableCell::new(range).colour(colour),
+        TableCell::new(missing).colour(colour),
+        TableCell::new(remark.or(shape).unwrap_or_default()).colour(remark_colour),
+    ]);
+    row.named(name)
 }
 
 /// A choice of the meaning `of` something. Returns the one newly picked.
 fn combo_ui(
     ui: &mut Ui,
     of: &str,
-    text: RichText,
+    text: &str,
     options: &[(Meaning, String)],
     shown: Option<Meaning>,
-    hint: &str,
 ) -> Option<Meaning> {
     let mut picked = None;
-    let value = text.text().to_owned();
-    let combo = ComboBox::from_id_salt(of).selected_text(text).width(MEANING_WIDTH);
+    let palette = Theme::of(ui).palette;
+    let colour = if shown == Some(Meaning::Unused) {
+        palette.dim
+    } else {
+        palette.text
+    };
+    let combo = ComboBox::from_id_salt(of)
+        .selected_text(RichText::new(text).color(colour))
+        .width(MEANING_WIDTH);
     let combo = combo.show_ui(ui, |ui| {
         for (option, text) in options {
             let choice = ui.selectable_label(Some(*option) == shown, text);
@@ -231,12 +223,12 @@ fn combo_ui(
             }
         }
     });
-    let response = combo.response;
-    response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, format!("Meaning of {of}")));
-    ui.ctx().accesskit_node_builder(response.id, |node| node.set_value(value));
-    if !hint.is_empty() {
-        response.on_hover_text(hint);
-    }
+    let label = format!("Meaning of {of}");
+    combo
+        .response
+        .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
+    ui.ctx()
+        .accesskit_node_builder(combo.response.id, |node| node.set_value(text));
     picked
 }
 
@@ -258,7 +250,11 @@ fn unit_ui(ui: &mut Ui, label: String, unit: &str) -> Option<String> {
     // As typed, including trailing spaces, which are not part of the unit.
     let kept: Option<String> = ui.data(|data| data.get_temp(id));
     let mut typed = kept.clone().unwrap_or_else(|| unit.to_owned());
-    let edit = ui.add(TextEdit::singleline(&mut typed).id(id).desired_width(UNIT_WIDTH - space(2)));
+    let edit = ui.add(
+        TextEdit::singleline(&mut typed)
+            .id(id)
+            .desired_width(UNIT_WIDTH - space(2)),
+    );
     ui.ctx().accesskit_node_builder(edit.id, |node| node.set_label(label));
     if !edit.has_focus() && kept.is_some() {
         ui.data_mut(|data| data.remove::<String>(id));
@@ -268,51 +264,20 @@ fn unit_ui(ui: &mut Ui, label: String, unit: &str) -> Option<String> {
     (edit.changed() && typed.trim() != unit).then_some(typed)
 }
 
-/// A figure at the right of its cell, named by `label`.
-fn figure(text: String, label: String, hint: String, colour: Color32) -> impl FnOnce(&mut Ui) {
-    move |ui| {
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let shown = ui.label(RichText::new(&text).size(type_size().note).color(colour));
-            shown.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{label}: {text}")));
-            shown.on_hover_text(hint);
-        });
-    }
-}
-
-/// Maximum number of characters of a figure, because a truncated one would be wrong.
-const MAX_CHARACTERS: [usize; 2] = [26, 6];
-
-/// Returns the ends of a range: with enough decimals to distinguish them or, if that is too long, with fewer, or rounded, with the
-/// width if they would look the same.
+/// Returns the ends of a range: with enough decimals to distinguish them or, if that is too long, rounded, with the width if they
+/// would look the same.
 fn range_text(min: f64, max: f64) -> String {
+    /// Because a truncated figure would be wrong.
+    const MAX_CHARACTERS: usize = 26;
     let span = max - min;
     let number = |value: f64| format_number(value).replace('-', "−");
-    if min == max {
-        return number(min);
-    }
-    if (1e-6..1e12).contains(&span) && min.abs().max(max.abs()) < 1e12 {
-        for step in [span / 100.0, span / 10.0] {
-            let text = format!("{} – {}", tick_text(min, step), tick_text(max, step));
-            if text.chars().count() <= MAX_CHARACTERS[0] {
-                return text;
-            }
-        }
-    }
-    match [min, max].map(number) {
-        [min, max] if min == max => format!("{min}, width {}", number(span)),
-        ends => ends.join(" – "),
-    }
-}
-
-/// Returns the number of rows with a missing cell or, if that is too long, its share.
-fn missing_text(missing: usize, rows: usize) -> String {
-    let count = missing.to_string();
-    if missing == 0 {
-        "–".to_owned()
-    } else if count.len() <= MAX_CHARACTERS[1] {
-        count
-    } else {
-        format!("{} %", format_number(100.0 * missing as f64 / rows.max(1) as f64))
+    let is_ordinary = (1e-6..1e12).contains(&span) && min.abs().max(max.abs()) < 1e12;
+    let exact = is_ordinary.then(|| [min, max].map(|end| tick_text(end, span / 100.0)).join(" – "));
+    match (exact, [min, max].map(number)) {
+        (_, [end, _]) if min == max => end,
+        (Some(exact), _) if exact.chars().count() <= MAX_CHARACTERS => exact,
+        (_, [min, max]) if min == max => format!("{min}, width {}", number(span)),
+        (_, ends) => ends.join(" – "),
     }
 }
 
@@ -370,8 +335,5 @@ mod tests {
         ] {
             assert_eq!(range_text(min, max), text);
         }
-        assert_eq!(missing_text(0, 10), "–");
-        assert_eq!(missing_text(123_456, 200_000_000), "123456");
-        assert_eq!(missing_text(123_456_789, 200_000_000), "61.7 %");
     }
 }

@@ -42,7 +42,7 @@ pub struct RecordingEditor {
     pub(super) opening: Opening,
     pub(super) checking: Checking,
     /// Texts in the fields of options that are not in the plan yet, by the names of the options.
-    pub(super) typed: BTreeMap<String, Typed>,
+    pub(super) typed: BTreeMap<&'static str, Typed>,
     /// True if the user is viewing the columns while there is a run to show.
     pub(super) shows_columns: bool,
     /// The file asked for last, and where its path arrives.
@@ -123,8 +123,8 @@ impl RecordingEditor {
     pub fn open_plan(&mut self, plan: &Plan) {
         self.held_out = None;
         let is_open = self.plan().is_ok_and(|open| *open == *plan);
-        let missing = self.missing.as_ref();
-        if !is_open && !missing.is_some_and(|missing| missing.recorded.plan == *plan) {
+        let missing = self.missing.as_ref().map(|missing| &missing.recorded.plan);
+        if !is_open && missing != Some(plan) {
             let reopened = Box::new(Reopened::from(plan.clone()));
             self.opening.start(ToOpen::Plan(reopened, None));
         } else if self.opening.is_reopening {
@@ -188,10 +188,14 @@ impl RecordingEditor {
 
     fn open_files(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
         let older = Box::new(self.import.clone().unwrap_or_default());
-        let variable = self.variable.as_ref().map(|(file, name, _)| (*file, name.as_str()));
-        let used = older.used(variable);
-        let files = Files { new, open, older, used };
-        self.opening.start(ToOpen::Files(files));
+        let used = older.used(self.variable.as_ref().map(|(file, name, _)| (*file, name.as_str())));
+        self.opening.start(ToOpen::Files(Files {
+            new,
+            open,
+            older,
+            used,
+            sample: None,
+        }));
     }
 
     /// Takes events of the threads and paths chosen, and reports the plan if it has changed.
@@ -240,7 +244,8 @@ impl RecordingEditor {
         match (of.clone(), &mut self.import, &self.missing) {
             (Use::Recording, ..) => self.open(paths),
             (Use::Missing(missing), _, Some(reopened)) => {
-                self.opening.start(ToOpen::Plan(reopened.clone(), Some((missing, path))));
+                self.opening
+                    .start(ToOpen::Plan(reopened.clone(), Some((missing, path))));
             }
             (Use::Test, Some(import), _) => {
                 let refused = paths.into_iter().filter_map(|path| import.add_test_file(path).err());
@@ -252,23 +257,21 @@ impl RecordingEditor {
     }
 
     fn take(&mut self, opened: Opened, shared: &Shared, effects: &mut Vec<Effect>) {
-        let held_out = shared.recording.settings.validation_fraction();
-        let show = |import: Import| {
-            let mut import = import;
-            import.edit().division.validation_fraction.get_or_insert(held_out);
+        let usual = shared.recording.settings.validation_fraction();
+        let holding_out = |mut import: Import| {
+            import.edit().division.validation_fraction.get_or_insert(usual);
             Some(import)
         };
         match opened {
             Opened::Recordings(import) => {
                 let import = import.keeping(self.import.take().unwrap_or_default());
-                (self.import, self.missing) = (show(import), None);
+                (self.import, self.missing) = (holding_out(import), None);
                 self.settle_variable();
                 self.show_columns(effects);
             }
             Opened::Plan(import, reopened) => {
                 self.close_all();
-                self.import = show(*import);
-                self.changed = reopened.changed;
+                (self.import, self.changed) = (holding_out(*import), reopened.changed);
                 if reopened.is_recipe {
                     self.show_columns(effects);
                 }
@@ -292,7 +295,25 @@ impl RecordingEditor {
                 effects.push(Effect::ChooseSource(SourceKind::Array));
                 effects.push(Effect::Configure(Box::new(settings)));
             }
-            Opened::Network(file, import) => self.take_network(*file, import, shared, effects),
+            Opened::Network(file, import) => {
+                let summary = RunSummary::of(&file);
+                let is_listed = shared.runs.workspace.runs.iter().any(|run| *run.summary == summary);
+                match import {
+                    None => effects.push(Effect::TakeSetup(Box::new(file.setup()))),
+                    Some(import) => {
+                        self.held_out = None;
+                        take_settings(file.settings, effects);
+                        match import {
+                            Ok(opened) => self.take(*opened, shared, effects),
+                            Err(reason) => effects.push(failed(reason)),
+                        }
+                    }
+                }
+                let name = file.source_name();
+                let text = format!("The settings of {name} are set. Its run is listed in Compare.");
+                effects.push(Effect::Notify(Matter::Recording, Notice::Done(text)));
+                effects.extend((!is_listed).then(|| Effect::KeepRun(file)));
+            }
             Opened::Checkpoint(path) => {
                 if self.refused.take().as_ref() != Some(&path) {
                     effects.push(Effect::OpenTraining(path));
@@ -307,7 +328,10 @@ impl RecordingEditor {
             return;
         };
         let mut variables = import.files.get(file).into_iter().flat_map(|file| &file.variables);
-        if let Some(columns) = variables.find(|variable| variable.name == name).map(|found| found.columns.clone()) {
+        if let Some(columns) = variables
+            .find(|variable| variable.name == name)
+            .map(|found| found.columns.clone())
+        {
             import.set_meanings(file, columns, meaning);
         }
     }
@@ -317,36 +341,6 @@ impl RecordingEditor {
         self.changed.clear();
         self.shows_columns = true;
         effects.push(Effect::ChooseSource(SourceKind::Recording));
-    }
-
-    fn take_network(
-        &mut self,
-        file: NetworkFile,
-        import: Option<Result<Box<Opened>, String>>,
-        shared: &Shared,
-        effects: &mut Vec<Effect>,
-    ) {
-        let summary = RunSummary::of(&file);
-        let is_listed = shared.runs.workspace.runs.iter().any(|run| *run.summary == summary);
-        match import {
-            None => effects.push(Effect::TakeSetup(Box::new(file.setup()))),
-            Some(import) => {
-                self.held_out = None;
-                take_settings(file.settings, effects);
-                match import {
-                    Ok(opened) => self.take(*opened, shared, effects),
-                    Err(reason) => effects.push(failed(reason)),
-                }
-            }
-        }
-        let text = format!(
-            "The settings of {} are set. Its run is listed in Compare.",
-            file.source_name()
-        );
-        effects.push(Effect::Notify(Matter::Recording, Notice::Done(text)));
-        if !is_listed {
-            effects.push(Effect::KeepRun(Box::new(file)));
-        }
     }
 
     /// Sets the share held out for validation when another method needs another share, unless the user has set it.
@@ -371,26 +365,23 @@ impl RecordingEditor {
 
     /// Returns the plan of the import, or what is missing and what to do.
     fn plan(&self) -> Result<Arc<Plan>, String> {
-        if let Some(missing) = &self.missing {
-            let missing = missing.missing.first().map(|path| file_name(path));
+        if let Some(missing) = self.missing.as_ref().and_then(|missing| missing.missing.first()) {
+            let name = file_name(missing);
             return Err(format!(
-                "{} is missing: find it under “Files”, or open another recording.",
-                missing.unwrap_or_default()
+                "{name} is missing: find it under “Files”, or open another recording."
             ));
         }
-        match &self.import {
-            None => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
-            Some(_) if self.opening.under_way.is_some() => Err("Files are being opened.".to_owned()),
-            Some(import) => match self.obstacle() {
-                Some(obstacle) => Err(obstacle),
-                None => Ok(Arc::clone(&import.plan)),
-            },
+        match (&self.import, self.obstacle()) {
+            (None, _) => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
+            (Some(_), _) if self.opening.under_way.is_some() => Err("Files are being opened.".to_owned()),
+            (Some(_), Some(obstacle)) => Err(obstacle),
+            (Some(import), None) => Ok(Arc::clone(&import.plan)),
         }
     }
 
     /// Returns the reason why there is nothing to train on yet: a text that was refused, or what the plan lacks.
     pub(super) fn obstacle(&self) -> Option<String> {
-        let refused = self.typed.values().find_map(Typed::refusal);
+        let refused = self.typed.values().find_map(|typed| typed.refusal.clone());
         refused.or_else(|| self.import.as_ref()?.obstacle())
     }
 
@@ -398,25 +389,20 @@ impl RecordingEditor {
     pub fn channels(&self) -> Option<(usize, usize)> {
         let import = self.import.as_ref()?;
         let channels = (import.count(Meaning::Input), import.count(Meaning::Target));
-        (channels.0 > 0 && channels.1 > 0).then_some(channels)
+        Some(channels).filter(|channels| channels.0 > 0 && channels.1 > 0)
     }
 
     /// Returns the size of a training with one network, once the import is checked.
     pub fn training_size(&self, settings: &RunSettings) -> Option<TrainingSize> {
         let checked = self.checking.checked.as_ref()?.as_ref().ok()?;
-        let (inputs, targets) = checked.channels;
-        let is_shared = settings.source.row_model() == RowModel::Shared;
-        is_shared.then_some(TrainingSize {
-            samples: checked.samples[0],
-            inputs,
-            targets,
-            networks: 1,
-        })
+        (settings.source.row_model() == RowModel::Shared).then_some(checked.size)
     }
 
     /// Returns true if a column contains the row numbers.
     pub fn has_row_wires(&self) -> bool {
-        self.import.as_ref().is_some_and(|import| import.has(Meaning::RowWire))
+        self.import
+            .as_ref()
+            .is_some_and(|import| import.plan.import.row_wire.is_some())
     }
 
     /// Returns true if the columns take the place of the results in the middle of the view.

@@ -9,7 +9,7 @@ use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
 use super::{
     editor::{RecordingEditor, Use},
     import::{Import, file_name},
-    opening::ToOpen,
+    opening::{Files, ToOpen},
 };
 use crate::window::{
     shared::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Shared, file_stem, sentence},
@@ -75,7 +75,10 @@ impl RecordingEditor {
             if button.on_hover_text(hint).clicked() {
                 let data_folder = shared.runs.path.as_ref().and_then(|runs| runs.parent());
                 let folder = data_folder.map_or_else(std::env::temp_dir, PathBuf::from);
-                self.opening.start(ToOpen::Sample(folder.join("samples")));
+                self.opening.start(ToOpen::Files(Files {
+                    sample: Some(folder.join("samples")),
+                    ..Files::default()
+                }));
             }
         }
     }
@@ -178,12 +181,20 @@ fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<OpenFile> {
         (OpenFile::Recording(number), path, what.to_owned())
     });
     let appended = recipe.append.iter().enumerate();
-    let appended = appended.map(|(number, set)| (OpenFile::Appended(number), set.data.clone(), ", appended".to_owned()));
-    let tests = import.tests().into_iter().map(|(number, recording, test)| {
-        let of = format!(", for the test of {}", file_name(&recording));
-        let what = if import.files.len() > 1 { of } else { ", for the test".to_owned() };
-        (OpenFile::Test(number), test, what)
-    });
+    let appended =
+        appended.map(|(number, set)| (OpenFile::Appended(number), set.data.clone(), ", appended".to_owned()));
+    let tests = import.tests().into_iter().enumerate();
+    let tests = tests
+        .filter(|(_, (_, test))| !test.as_os_str().is_empty())
+        .map(|(number, (recording, test))| {
+            let of = format!(", for the test of {}", file_name(&recording));
+            let what = if import.files.len() > 1 {
+                of
+            } else {
+                ", for the test".to_owned()
+            };
+            (OpenFile::Test(number), test, what)
+        });
     let positions = recipe.positions.iter();
     let positions = positions.map(|path| (OpenFile::Positions, path.clone(), ", positions".to_owned()));
     let mut closed = None;

@@ -1,13 +1,15 @@
 //! The import that is edited: its plan, and the inspection of its files.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::BTreeMap,
+    iter::once,
+    ops::Range,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
 use decoupler_core::dataset::SplitBy;
-use decoupler_files::import::{FileSet, InspectedFile, Joined, Meaning, Plan, Recipe};
+use decoupler_files::import::{FileSet, Format, InspectedFile, Meaning, Plan, Recipe};
 
 /// A column by its file and its name there, which do not change when another file becomes the first.
 type ColumnKey = (PathBuf, String);
@@ -26,90 +28,77 @@ pub(super) struct Import {
 }
 
 impl Import {
-    /// The import of a recipe whose files have been inspected: nothing in it is a guess.
-    pub(super) fn of_recipe(plan: Plan, files: Vec<InspectedFile>) -> Self {
-        let (mut chosen, mut units) = (BTreeMap::new(), BTreeMap::new());
-        for file in &files {
-            for (column, meaning) in file.meanings.iter().enumerate() {
-                chosen.insert(key(file, column), *meaning);
-                let unit = plan.import.units.get(&file.full_name(column));
-                units.extend(unit.map(|unit| (key(file, column), unit.clone())));
-            }
-        }
+    /// The import of a suggested plan whose files have been inspected.
+    pub(super) fn suggested(plan: Plan, files: Vec<InspectedFile>) -> Self {
         Self {
             plan: Arc::new(plan),
             files,
-            chosen,
-            units,
+            ..Self::default()
         }
     }
 
-    /// The import of a suggested plan, which names each column in full. `files` are inspected in any order.
-    pub(super) fn suggested(plan: Plan, mut files: Vec<InspectedFile>) -> Self {
-        let Recipe { inputs, targets, .. } = &plan.import;
-        let several = [(inputs, Meaning::Input), (targets, Meaning::Target)];
-        let several = several.into_iter().flat_map(|(names, meaning)| names.iter().map(move |name| (name, meaning)));
-        let single = [(&plan.import.group, Meaning::Group), (&plan.import.row_wire, Meaning::RowWire)];
-        let single = single.into_iter().filter_map(|(name, meaning)| Some((name.as_ref()?, meaning)));
-        let meanings: HashMap<&String, Meaning> = several.chain(single).collect();
-        let times = std::iter::once(&plan.import.time).chain(plan.import.join.iter().map(|joined| &joined.time));
-        let mut ordered = Vec::new();
-        for ((path, stem), time) in paths_and_stems(&plan.import).zip(times) {
-            let Some(place) = files.iter().position(|file| file.path == path) else {
-                continue;
-            };
-            let mut file = InspectedFile {
-                stem,
-                ..files.remove(place)
-            };
-            for column in 0..file.columns.len() {
-                let is_time = time.as_ref() == Some(&file.columns[column].name);
-                let named = meanings.get(&file.full_name(column)).copied().unwrap_or_default();
-                file.meanings[column] = if is_time { Meaning::Time } else { named };
+    /// The import of a recipe: nothing in it is a guess.
+    pub(super) fn of_recipe(plan: Plan, files: Vec<InspectedFile>) -> Self {
+        let mut import = Self::suggested(plan, files);
+        for file in &import.files {
+            for (column, meaning) in file.meanings.iter().enumerate() {
+                import.chosen.insert(key(file, column), *meaning);
+                let unit = import.plan.import.units.get(&file.full_name(column));
+                import.units.extend(unit.map(|unit| (key(file, column), unit.clone())));
             }
-            ordered.push(file);
         }
-        Self {
-            plan: Arc::new(plan),
-            files: ordered,
-            ..Self::default()
+        import
+    }
+
+    /// Returns a plan with other files and roles, and everything else as in this import.
+    pub(super) fn merged(&self, found: Plan) -> Plan {
+        let older = &self.plan.import;
+        let mut import = Recipe {
+            data: found.import.data,
+            join: found.import.join,
+            append: found.import.append,
+            inputs: found.import.inputs,
+            targets: found.import.targets,
+            time: found.import.time,
+            group: found.import.group,
+            row_wire: found.import.row_wire,
+            positions: found.import.positions.or_else(|| older.positions.clone()),
+            ..older.clone()
+        };
+        for joined in &mut import.join {
+            if let Some(before) = older.join.iter().find(|before| before.file == joined.file) {
+                joined.limit = before.limit;
+                joined.stem.clone_from(&before.stem);
+            }
+        }
+        let mut renamed = BTreeMap::new();
+        for (path, stem) in paths_and_stems(&import) {
+            if let Some(file) = self.files.iter().find(|file| file.path == path) {
+                let mut now = file.clone();
+                now.stem = stem;
+                renamed.extend(names(file, |_| true).into_iter().zip(names(&now, |_| true)));
+            }
+        }
+        for condition in &mut import.conditions {
+            *condition = condition.clone().renamed(|name| renamed.get(name).cloned());
+        }
+        for column in import.missing.iter_mut().filter_map(|missing| missing.column.as_mut()) {
+            *column = renamed.get(column).unwrap_or(column).clone();
+        }
+        let columns = self.files.iter().flat_map(|file| names(file, |_| true));
+        columns.for_each(|name| drop(import.units.remove(&name)));
+        let paths = Vec::from_iter(paths_and_stems(&import).map(|(path, _)| path.to_owned()));
+        let test = self.plan.test.as_ref().map(|test| self.matching(test, &paths));
+        Plan {
+            import,
+            test: found.test.or(test).filter(is_given),
+            division: self.plan.division,
         }
     }
 
     /// Returns this suggestion with the choices in an `older` import, as far as they fit the files.
     pub(super) fn keeping(mut self, older: Self) -> Self {
-        let Plan {
-            import: found,
-            test: found_test,
-            ..
-        } = Plan::clone(&self.plan);
-        let renamed = older.renamed(&found);
-        let mut import = Recipe {
-            data: found.data,
-            join: found.join,
-            append: found.append,
-            inputs: found.inputs,
-            targets: found.targets,
-            time: found.time,
-            group: found.group,
-            row_wire: found.row_wire,
-            positions: found.positions.or_else(|| older.plan.import.positions.clone()),
-            ..older.plan.import.clone()
-        };
-        rename(&mut import, &renamed);
-        for joined in &mut import.join {
-            let mut before = older.plan.import.join.iter();
-            joined.limit = before.find(|before| before.file == joined.file).and_then(|before| before.limit);
-        }
-        for file in &older.files {
-            (0..file.columns.len()).for_each(|column| drop(import.units.remove(&file.full_name(column))));
-        }
-        let test = older.plan.test.as_ref().map(|test| older.matching(test, &self.paths()));
-        self.plan = Arc::new(Plan {
-            import,
-            test: found_test.or(test).filter(is_given),
-            division: older.plan.division,
-        });
+        self.plan = Arc::new(older.merged(Arc::unwrap_or_clone(self.plan)));
         (self.chosen, self.units) = (older.chosen, older.units);
         for file in 0..self.files.len() {
             for column in 0..self.files[file].columns.len() {
@@ -118,8 +107,7 @@ impl Import {
                     self.give(file, column, meaning);
                 }
                 if let Some(unit) = self.units.get(&key).cloned() {
-                    let name = self.files[file].full_name(column);
-                    self.edit().import.units.insert(name, unit);
+                    self.set_unit(file, column, &unit);
                 }
             }
         }
@@ -127,68 +115,25 @@ impl Import {
         self
     }
 
-    /// Returns the recipe for inspecting the recordings at `paths`, whose columns have no meaning yet.
-    pub(super) fn to_inspect(&self, paths: &[PathBuf]) -> Recipe {
-        let import = &self.plan.import;
-        let stem = |file: &PathBuf| {
-            let mut joined = import.join.iter();
-            joined.find(|joined| joined.file == *file)?.stem.clone()
-        };
-        let joined = |file: &PathBuf| Joined {
-            file: file.clone(),
-            stem: stem(file),
-            ..Joined::default()
-        };
-        let mut recipe = Recipe {
-            data: paths.first().cloned().unwrap_or_default(),
-            join: paths.iter().skip(1).map(joined).collect(),
-            dialect: import.dialect,
-            derive: import.derive.clone(),
-            missing: import.missing.clone(),
-            time: import.time.clone().filter(|_| !import.derive.is_empty()),
-            ..Recipe::default()
-        };
-        let renamed = self.renamed(&recipe);
-        rename(&mut recipe, &renamed);
-        recipe
-    }
-
-    /// Full names of the columns in use. In the file with a `variable` whose rows are to be the samples, only that is.
+    /// Full names of the columns in use; in the file with a `variable` whose rows are to be the samples, only that.
     pub(super) fn used(&self, variable: Option<(usize, &str)>) -> Vec<String> {
-        let mut used = Vec::new();
-        for (number, file) in self.files.iter().enumerate() {
-            match variable {
-                Some((of_file, name)) if of_file == number => used.push(match &file.stem {
-                    None => name.to_owned(),
-                    Some(stem) => format!("{stem}.{name}"),
-                }),
-                _ => {
-                    let columns = (0..file.columns.len()).filter(|&column| file.meanings[column] != Meaning::Unused);
-                    used.extend(columns.map(|column| file.full_name(column)));
-                }
+        let of_file = |(number, file): (usize, &InspectedFile)| match variable {
+            Some((of_file, name)) if of_file == number => {
+                let stem = file.stem.iter().map(String::as_str);
+                vec![Vec::from_iter(stem.chain([name])).join(".")]
             }
-        }
-        used
+            _ => names(file, |meaning| meaning != Meaning::Unused),
+        };
+        self.files.iter().enumerate().flat_map(of_file).collect()
     }
 
-    /// Returns the full names that change if the files are read by `recipe`: those of a joined file have its stem in front,
-    /// those of the first file have none.
-    fn renamed(&self, recipe: &Recipe) -> BTreeMap<String, String> {
-        let mut names = BTreeMap::new();
-        for (path, stem) in paths_and_stems(recipe) {
-            let mut files = self.files.iter();
-            let Some(file) = files.find(|file| file.path == path && file.stem != stem) else {
-                continue;
-            };
-            for (column, summary) in file.columns.iter().enumerate() {
-                let name = match &stem {
-                    None => summary.name.clone(),
-                    Some(stem) => format!("{stem}.{}", summary.name),
-                };
-                names.insert(file.full_name(column), name);
-            }
-        }
-        names
+    /// Returns the layout of each text file, as a sentence.
+    pub(super) fn text_formats(&self) -> Vec<String> {
+        let text = self.files.iter().filter_map(|file| match &file.format {
+            Format::Text(dialect) => Some(format!("{}: {dialect}.", file_name(&file.path))),
+            _ => None,
+        });
+        text.collect()
     }
 
     /// Returns the files of `set`, which correspond to those of this import, for the recordings at `paths`; an empty path
@@ -196,8 +141,8 @@ impl Import {
     pub(super) fn matching(&self, set: &FileSet, paths: &[PathBuf]) -> FileSet {
         let own = self.paths();
         let mut files = paths.iter().map(|path| {
-            let place = own.iter().position(|other| other == path);
-            place.and_then(|place| set.files().nth(place)).cloned().unwrap_or_default()
+            let found = own.iter().zip(set.files()).find(|(other, _)| *other == path);
+            found.map_or_else(PathBuf::new, |(_, file)| file.clone())
         });
         FileSet {
             data: files.next().unwrap_or_default(),
@@ -213,7 +158,7 @@ impl Import {
 
     /// Gives these columns of a file a meaning; if only one column can have it, the previous one loses it. Several columns get
     /// it only if they can be used and have no special meaning.
-    pub(super) fn set_meanings(&mut self, file: usize, columns: impl ExactSizeIterator<Item = usize>, meaning: Meaning) {
+    pub(super) fn set_meanings(&mut self, file: usize, columns: Range<usize>, meaning: Meaning) {
         let had_groups = self.plan.import.has_groups();
         let is_single = columns.len() == 1;
         for column in columns {
@@ -247,21 +192,17 @@ impl Import {
 
     /// Writes the meanings of the columns into the plan. The samples are divided by group if there are groups now.
     fn write_meanings(&mut self, had_groups: bool) {
-        let of = |meaning: Meaning| -> Vec<String> {
-            let of_file = |file: &InspectedFile| {
-                let columns = (0..file.columns.len()).filter(|&column| file.meanings[column] == meaning);
-                Vec::from_iter(columns.map(|column| file.full_name(column)))
-            };
-            self.files.iter().flat_map(of_file).collect()
+        let of = |meaning| {
+            let named = self.files.iter().flat_map(|file| names(file, |other| other == meaning));
+            Vec::from_iter(named)
         };
-        let [inputs, targets, group, row_wire] =
-            [Meaning::Input, Meaning::Target, Meaning::Group, Meaning::RowWire].map(of);
+        let (inputs, targets) = (of(Meaning::Input), of(Meaning::Target));
+        let (group, row_wire) = (of(Meaning::Group).pop(), of(Meaning::RowWire).pop());
         // Without times in every file, rows belong together by their numbers.
         let times: Option<Vec<String>> = self.files.iter().map(time).collect();
         let mut times = times.into_iter().flatten();
         let Plan { import, division, .. } = self.edit();
-        (import.inputs, import.targets) = (inputs, targets);
-        (import.group, import.row_wire) = (group.into_iter().next(), row_wire.into_iter().next());
+        (import.inputs, import.targets, import.group, import.row_wire) = (inputs, targets, group, row_wire);
         import.time = times.next();
         import.join.iter_mut().for_each(|joined| joined.time = times.next());
         match (had_groups, import.has_groups()) {
@@ -269,11 +210,6 @@ impl Import {
             (_, false) if division.by == SplitBy::Group => division.by = SplitBy::Time,
             _ => {}
         }
-    }
-
-    /// Returns `true` if a column of any file has this meaning.
-    pub(super) fn has(&self, meaning: Meaning) -> bool {
-        self.count(meaning) > 0
     }
 
     /// Returns the number of columns of this meaning.
@@ -292,25 +228,28 @@ impl Import {
     /// Gives a column a unit; none if it is empty or that of the header.
     pub(super) fn set_unit(&mut self, file: usize, column: usize, unit: &str) {
         let file = &self.files[file];
-        let (key, name) = (key(file, column), file.full_name(column));
-        let unit = Some(unit.trim()).filter(|unit| !unit.is_empty() && file.columns[column].unit.as_deref() != Some(*unit));
+        let (key, name, unit) = (key(file, column), file.full_name(column), unit.trim());
+        let is_given = !unit.is_empty() && file.columns[column].unit.as_deref() != Some(unit);
+        self.edit().import.units.remove(&name);
         self.units.remove(&key);
-        self.units.extend(unit.map(|unit| (key, unit.to_owned())));
-        let units = &mut self.edit().import.units;
-        units.remove(&name);
-        units.extend(unit.map(|unit| (name, unit.to_owned())));
+        if is_given {
+            self.edit().import.units.insert(name, unit.to_owned());
+            self.units.insert(key, unit.to_owned());
+        }
     }
 
     /// Returns the paths of the first recording and of those joined to it.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
-        paths_and_stems(&self.plan.import).map(|(path, _)| path.to_owned()).collect()
+        paths_and_stems(&self.plan.import)
+            .map(|(path, _)| path.to_owned())
+            .collect()
     }
 
-    /// Returns the files for the test, each with the recording that it replaces and its number.
-    pub(super) fn tests(&self) -> Vec<(usize, PathBuf, PathBuf)> {
-        let tests = self.plan.test.iter().flat_map(FileSet::files).enumerate();
-        let tests = tests.zip(self.paths()).filter(|((_, test), _)| !test.as_os_str().is_empty());
-        tests.map(|((number, test), recording)| (number, recording, test.clone())).collect()
+    /// Returns the files for the test, each with the recording that it replaces; the path of a file that is still to be given
+    /// is empty.
+    pub(super) fn tests(&self) -> Vec<(PathBuf, PathBuf)> {
+        let tests = self.plan.test.iter().flat_map(FileSet::files);
+        self.paths().into_iter().zip(tests.cloned()).collect()
     }
 
     /// Adds a file of test samples for the first recording that has none. With a single recording its test file is replaced.
@@ -319,14 +258,16 @@ impl Import {
     /// If it cannot be one; the message says what to do.
     pub(super) fn add_test_file(&mut self, path: PathBuf) -> Result<(), String> {
         let (name, recordings, tests) = (file_name(&path), self.paths(), self.tests());
-        let mut numbers = 0..recordings.len();
-        let lacking = numbers.find(|number| tests.iter().all(|(other, ..)| other != number));
-        let Some(number) = lacking.or((recordings.len() == 1).then_some(0)) else {
-            return Err(format!(
-                "{name} was not opened: each of the {} recordings already has a file for the test. To use others, close \
-                 those files first.",
-                recordings.len()
-            ));
+        let lacking = tests.iter().position(|(_, test)| is_empty(test));
+        let number = match (lacking, recordings.len()) {
+            (Some(number), _) => number,
+            (None, count) if tests.is_empty() || count == 1 => 0,
+            (None, count) => {
+                return Err(format!(
+                    "{name} was not opened: each of the {count} recordings already has a file for the test. To use others, \
+                     close those files first."
+                ));
+            }
         };
         // The same file may be joined to both: its times distinguish its rows.
         if number == 0 && recordings[0] == path {
@@ -340,18 +281,17 @@ impl Import {
 
     /// Sets the file that replaces this recording for the test; with an empty path, closes it.
     pub(super) fn set_test_file(&mut self, number: usize, path: PathBuf) {
-        let recordings = self.paths().len();
-        let plan = self.edit();
-        let mut test = plan.test.take().unwrap_or_default();
-        if path.as_os_str().is_empty() {
+        let joined = self.plan.import.join.len();
+        let mut test = self.edit().test.take().unwrap_or_default();
+        if is_empty(&path) {
             test.append.clear();
         }
-        test.join.resize(recordings - 1, PathBuf::new());
+        test.join.resize(joined, PathBuf::new());
         match number.checked_sub(1) {
             None => test.data = path,
             Some(joined) => test.join[joined] = path,
         }
-        plan.test = Some(test).filter(is_given);
+        self.edit().test = Some(test).filter(is_given);
     }
 
     /// Closes one of the files whose rows follow those of the first, with the files joined to it.
@@ -362,23 +302,27 @@ impl Import {
 
     /// Returns the reason why there is nothing to train on yet, with what to do.
     pub(super) fn obstacle(&self) -> Option<String> {
-        if let Some(test) = &self.plan.test
-            && let Some(number) = test.files().position(|path| path.as_os_str().is_empty())
-        {
+        if let Some((recording, _)) = self.tests().iter().find(|(_, test)| is_empty(test)) {
             return Some(format!(
                 "{} has no file for the test yet: choose it with “Test file…” under “Samples”, or close the other files of \
                  the test.",
-                file_name(&self.paths()[number])
+                file_name(recording)
             ));
         }
         let needed = [(Meaning::Input, "an input"), (Meaning::Target, "a target")];
-        let lacking = needed.into_iter().find(|(meaning, _)| !self.has(*meaning));
+        let lacking = needed.into_iter().find(|(meaning, _)| self.count(*meaning) == 0);
         lacking.map(|(_, what)| format!("No column is {what}: choose one in the table of columns."))
     }
 }
 
 fn key(file: &InspectedFile, column: usize) -> ColumnKey {
     (file.path.clone(), file.columns[column].name.clone())
+}
+
+/// Full names of the columns of a file with some meanings.
+fn names(file: &InspectedFile, is_wanted: impl Fn(Meaning) -> bool) -> Vec<String> {
+    let columns = (0..file.columns.len()).filter(|&column| is_wanted(file.meanings[column]));
+    columns.map(|column| file.full_name(column)).collect()
 }
 
 /// Returns the name of the time column of a file, without its stem.
@@ -391,30 +335,22 @@ fn time(file: &InspectedFile) -> Option<String> {
 fn paths_and_stems(recipe: &Recipe) -> impl Iterator<Item = (&Path, Option<String>)> {
     let joined = recipe.join.iter().zip(recipe.stems());
     let joined = joined.map(|(joined, stem)| (joined.file.as_path(), Some(stem)));
-    std::iter::once((recipe.data.as_path(), None)).chain(joined)
+    once((recipe.data.as_path(), None)).chain(joined)
 }
 
-/// Gives the columns of conditions and of markers of missing cells their new names.
-fn rename(recipe: &mut Recipe, renamed: &BTreeMap<String, String>) {
-    let conditions = std::mem::take(&mut recipe.conditions).into_iter();
-    let conditions = conditions.map(|condition| condition.renamed(|name| renamed.get(name).cloned()));
-    recipe.conditions = conditions.collect();
-    for column in recipe.missing.iter_mut().filter_map(|missing| missing.column.as_mut()) {
-        if let Some(name) = renamed.get(column) {
-            column.clone_from(name);
-        }
-    }
+fn is_empty(path: &Path) -> bool {
+    path.as_os_str().is_empty()
 }
 
 /// Returns `true` if a set has any file.
 fn is_given(set: &FileSet) -> bool {
-    set.files().any(|path| !path.as_os_str().is_empty())
+    !set.files().all(|path| is_empty(path))
 }
 
 /// Returns the name of a file without its folder.
 pub(super) fn file_name(path: &Path) -> String {
-    path.file_name().map_or_else(
-        || path.display().to_string(),
-        |name| name.to_string_lossy().into_owned(),
-    )
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
 }

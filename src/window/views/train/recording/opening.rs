@@ -11,8 +11,8 @@ use decoupler_core::dataset::Simulation;
 use decoupler_files::{
     export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, atomic_write},
     import::{
-        FileChecksum, FileSet, Format, Plan, Progress, Recorded, Watch, file_crc32, holds_positions, suggested_plan,
-        suggested_plan_in_order,
+        FileChecksum, FileSet, Format, Joined, Plan, Progress, Recorded, Watch, file_crc32, holds_positions,
+        suggested_plan, suggested_plan_in_order,
     },
 };
 
@@ -29,8 +29,6 @@ pub(super) enum ToOpen {
     Files(Files),
     /// Files of a plan, of which the missing one at the first path was found at the second.
     Plan(Box<Reopened>, Option<(PathBuf, PathBuf)>),
-    /// The sample recording, to be written into this folder.
-    Sample(PathBuf),
 }
 
 /// Recordings to be opened.
@@ -38,6 +36,8 @@ pub(super) enum ToOpen {
 pub(super) struct Files {
     /// Files to be opened: one may be a recipe, a network or a checkpoint.
     pub(super) new: Vec<PathBuf>,
+    /// Folder into which the sample recording is written, to be opened too.
+    pub(super) sample: Option<PathBuf>,
     /// Files that are open, to which recordings are added.
     pub(super) open: Vec<PathBuf>,
     /// The import with them.
@@ -91,14 +91,12 @@ impl Opening {
 
     /// Opens files; those still being opened are abandoned.
     pub(super) fn start(&mut self, to_open: ToOpen) {
-        let names = match &to_open {
-            ToOpen::Files(Files { new, open, .. }) => {
-                let names = if new.is_empty() { open } else { new };
-                Vec::from_iter(names.iter().map(|path| file_name(path))).join(", ")
-            }
-            ToOpen::Plan(reopened, _) => file_name(&reopened.recorded.plan.import.data),
-            ToOpen::Sample(_) => "sample recording".to_owned(),
+        let paths = match &to_open {
+            ToOpen::Files(files) if files.new.is_empty() => &files.open[..],
+            ToOpen::Files(files) => &files.new,
+            ToOpen::Plan(reopened, _) => std::slice::from_ref(&reopened.recorded.plan.import.data),
         };
+        let names = Vec::from_iter(paths.iter().map(|path| file_name(path))).join(", ");
         self.is_reopening = matches!(to_open, ToOpen::Plan(..));
         self.under_way = Some((names, None));
         self.job.start(
@@ -145,74 +143,77 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
             }
             reopen(*reopened, &mut watch)
         }
-        ToOpen::Sample(folder) => {
-            let new = vec![write_sample(&folder)?];
-            let files = Files {
-                new,
-                ..Files::default()
-            };
-            open_files(files, &mut watch)
-        }
     }
 }
 
 fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
-    let Files { new, open, older, used } = files;
-    let new = with_tables_of_folders(new)?;
-    let mut kinds = new.iter().filter_map(|path| Some((path, DocumentKind::of_file(path)?)));
-    match (kinds.next(), &new[..]) {
+    let older = files.older;
+    let mut new = with_tables_of_folders(files.new)?;
+    new.extend(files.sample.map(|folder| write_sample(&folder)).transpose()?);
+    let document = new.iter().find_map(|path| Some((path, DocumentKind::of_file(path)?)));
+    match (document, new.len()) {
         (None, _) => {}
-        (Some((path, kind)), [_]) => return open_document(kind, path, watch),
+        (Some((path, kind)), 1) => return open_document(kind, path, watch),
         (Some((path, kind)), _) => {
             return Err(format!("'{}' is a {kind}: open it without other files", path.display()));
         }
     }
     let tests = older.tests();
-    if let Some(path) = new.iter().find(|path| tests.iter().any(|(.., test)| test == *path)) {
+    if let Some(path) = new.iter().find(|path| tests.iter().any(|(_, test)| test == *path)) {
         return Err(format!(
             "'{}' is a file for the test, so it cannot be trained on: close it under “Files” first",
             path.display()
         ));
     }
     let (positions, recordings): (Vec<PathBuf>, Vec<PathBuf>) = new.into_iter().partition(|path| holds_positions(path));
-    match &positions[..] {
-        [path] if open.is_empty() && recordings.is_empty() => {
-            return Err(format!(
-                "'{}' has positions of targets: open their recording first, or with it",
-                path.display()
-            ));
-        }
-        [] | [_] => {}
-        [one, other, ..] => {
-            let (one, other) = (one.display(), other.display());
-            return Err(format!(
-                "'{one}' and '{other}' both have positions of targets: open one of them"
-            ));
-        }
+    let has_recording = !(files.open.is_empty() && recordings.is_empty());
+    if let Some(path) = positions.first().filter(|_| positions.len() > 1 || !has_recording) {
+        let path = path.display();
+        return Err(format!(
+            "'{path}' has positions of targets: open one such file, with its recording or after it"
+        ));
     }
+    // The file with the readings is guessed only if the set of files changes.
     let has_new = !recordings.is_empty();
     let appended = &older.plan.import.append;
-    let mut paths = open;
-    if has_new {
-        paths.extend(appended.iter().flat_map(FileSet::files).cloned());
-    }
-    for path in recordings {
-        if !paths.contains(&path) {
-            paths.push(path);
+    let mut paths = files.open;
+    let further = appended.iter().flat_map(FileSet::files).filter(|_| has_new);
+    for path in further.chain(&recordings) {
+        if !paths.contains(path) {
+            paths.push(path.clone());
         }
     }
-    let inspected = older.to_inspect(&paths).inspect(Path::new(""), &used, watch);
-    let inspected = inspected.map_err(|error| in_window(&error))?;
-    // The file with the readings is guessed only if the set of files has changed.
-    let mut plan = if has_new {
+    let time = older.plan.import.time.clone();
+    let time = time.filter(|_| !older.plan.import.derive.is_empty());
+    let mut inspect = |plan: &Plan| {
+        let mut import = older.merged(plan.clone()).import;
+        import.time = import.time.or_else(|| time.clone());
+        let inspected = import.inspect(Path::new(""), &files.used, watch);
+        inspected.map_err(|error| in_window(&error))
+    };
+    let mut plan = Plan::default();
+    let mut in_order = paths.iter().cloned();
+    plan.import.data = in_order.next().unwrap_or_default();
+    plan.import.join = in_order.map(joined).collect();
+    let inspected = inspect(&plan)?;
+    plan = if has_new {
         suggested_plan(&inspected)
     } else {
-        let mut plan = suggested_plan_in_order(&inspected);
-        plan.import.append = appended.iter().map(|set| older.matching(set, &paths)).collect();
-        plan
+        suggested_plan_in_order(&inspected)
     };
+    if !has_new {
+        plan.import.append = appended.iter().map(|set| older.matching(set, &paths)).collect();
+    }
     plan.import.positions = positions.into_iter().next();
+    let inspected = inspect(&plan)?;
     Ok(Opened::Recordings(Box::new(Import::suggested(plan, inspected))))
+}
+
+fn joined(file: PathBuf) -> Joined {
+    Joined {
+        file,
+        ..Joined::default()
+    }
 }
 
 /// Replaces folders by the tables in them.
@@ -237,10 +238,8 @@ fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Op
     match kind {
         DocumentKind::Recipe => match RecipeFile::load(path).map_err(|error| error.to_string())? {
             RecipeFile::Recording(plan) => {
-                let reopened = Reopened {
-                    is_recipe: true,
-                    ..Reopened::from(plan.absolute())
-                };
+                let mut reopened = Reopened::from(plan.absolute());
+                reopened.is_recipe = true;
                 reopen(reopened, watch)
             }
             RecipeFile::Simulated(simulation) => Ok(Opened::Simulation(Box::new(simulation))),
@@ -253,16 +252,15 @@ fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Op
         }
         DocumentKind::Checkpoint => {
             // The worker reports an error in the file.
-            let file = CheckpointFile::load(path).ok();
-            let reopened = file.and_then(|file| {
-                let recorded = file.recorded.clone()?;
-                let checkpoint = Some(Box::new(file));
-                Some(Reopened { checkpoint, ..Reopened::from(recorded) }.looked_up())
-            });
-            Ok(match reopened.filter(|reopened| !reopened.missing.is_empty()) {
-                Some(reopened) => Opened::Missing(Box::new(reopened)),
-                None => Opened::Checkpoint(path.to_owned()),
-            })
+            if let Ok(file) = CheckpointFile::load(path)
+                && let Some(recorded) = file.recorded.clone()
+                && !recorded.missing().is_empty()
+            {
+                let mut reopened = Reopened::from(recorded);
+                reopened.checkpoint = Some(Box::new(file));
+                return reopen(reopened, watch);
+            }
+            Ok(Opened::Checkpoint(path.to_owned()))
         }
         other => Err(format!(
             "'{}' is a {other}: open a recording (CSV, .npy, .npz or .mat), a recipe, a network or a checkpoint",
@@ -271,13 +269,24 @@ fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Op
     }
 }
 
-/// Opens the files of a plan again, if all are there.
-fn reopen(reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
-    let mut reopened = reopened.looked_up();
+/// Opens the files of a plan again, if all are there, and notes which have changed.
+fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
+    let missing = reopened.recorded.missing();
+    reopened.missing = missing.into_iter().map(PathBuf::from).collect();
     if !reopened.missing.is_empty() {
         return Ok(Opened::Missing(Box::new(reopened)));
     }
-    reopened.compare()?;
+    for file in &reopened.recorded.files {
+        if !has_checksum(&file.path, &file.crc32)? {
+            reopened.changed.push(file_name(&file.path));
+        }
+    }
+    if let (Some(_), Some(name)) = (&reopened.checkpoint, reopened.changed.first()) {
+        return Err(format!(
+            "{name} has changed since the training was saved, so the training cannot be resumed with it. Use the original \
+             file."
+        ));
+    }
     let plan = reopened.recorded.plan.clone();
     let files = plan.import.inspect(Path::new(""), &[], watch);
     let import = Import::of_recipe(plan, files.map_err(|error| in_window(&error))?);
@@ -330,33 +339,6 @@ impl From<Plan> for Reopened {
 }
 
 impl Reopened {
-    /// Returns it with the files that no longer exist.
-    fn looked_up(mut self) -> Self {
-        self.missing = self.recorded.missing().into_iter().map(PathBuf::from).collect();
-        self
-    }
-
-    /// Notes the names of files whose contents have changed.
-    ///
-    /// # Errors
-    /// If a file cannot be read, or has changed while a training is to be resumed with it.
-    fn compare(&mut self) -> Result<(), String> {
-        let mut changed = Vec::new();
-        for file in &self.recorded.files {
-            if file.path.is_file() && !has_checksum(&file.path, &file.crc32)? {
-                changed.push(file_name(&file.path));
-            }
-        }
-        if let (Some(_), Some(name)) = (&self.checkpoint, changed.first()) {
-            return Err(format!(
-                "{name} has changed since the training was saved, so the training cannot be resumed with it. \
-                 Use the original file."
-            ));
-        }
-        self.changed = changed;
-        Ok(())
-    }
-
     /// Replaces a missing file by `found`, and other missing files by those of the same name and contents next to it.
     ///
     /// # Errors
@@ -376,9 +358,9 @@ impl Reopened {
     }
 }
 
-/// Returns true if the file has this checksum, or the checksum is not known.
+/// Returns true if the file has this checksum, or the checksum is not known, as that of a pipe.
 fn has_checksum(path: &Path, crc32: &str) -> Result<bool, String> {
-    if crc32.is_empty() {
+    if crc32.is_empty() || !path.is_file() {
         return Ok(true);
     }
     let found = file_crc32(path, &mut |_| ControlFlow::Continue(()));
@@ -395,13 +377,10 @@ const TEXT: &str = include_str!("../../../../../assets/samples/soft_skin.csv");
 /// If it cannot be written.
 fn write_sample(folder: &Path) -> Result<PathBuf, String> {
     let path = folder.join(NAME);
-    let refused = |error: &dyn std::fmt::Display| format!("the sample recording cannot be written: {error}");
-    fs::create_dir_all(folder).map_err(|error| refused(&error))?;
-    // An unchanged file keeps its modification time.
-    if fs::read(&path).is_ok_and(|written| written == TEXT.as_bytes()) {
-        return Ok(path);
-    }
-    atomic_write(&path, |file| file.write_all(TEXT.as_bytes())).map_err(|error| refused(&error))?;
+    let written = fs::create_dir_all(folder).map_err(|error| error.to_string());
+    let write = |()| atomic_write(&path, |file| file.write_all(TEXT.as_bytes())).map_err(|error| error.to_string());
+    let written = written.and_then(write);
+    written.map_err(|error| format!("the sample recording cannot be written: {error}"))?;
     Ok(path)
 }
 
@@ -429,19 +408,24 @@ mod tests {
         for file in &mut reopened.recorded.files {
             file.crc32 = file_crc32(&at(&file_name(&file.path)), &mut |_| ControlFlow::Continue(())).unwrap();
         }
-        let mut reopened = reopened.looked_up();
+        let open = |reopened: &Reopened| reopen(reopened.clone(), &mut |_| ControlFlow::Continue(())).unwrap();
+        let Opened::Missing(mut reopened) = open(&reopened) else {
+            panic!("nothing is missing");
+        };
         assert_eq!(reopened.missing, [gone("sensor.csv"), gone("states.csv")]);
 
         let mut found = reopened.clone();
         found.relocate(&gone("sensor.csv"), &at("sensor.csv")).unwrap();
-        let mut found = found.looked_up();
-        assert!(found.missing.is_empty(), "the other file is next to it");
-        assert_eq!(found.recorded.plan.import.join[0].file, at("states.csv"));
-        found.compare().unwrap();
+        let Opened::Plan(import, found) = open(&found) else {
+            panic!("the other file is next to it");
+        };
+        assert_eq!(import.plan.import.join[0].file, at("states.csv"));
         assert!(found.changed.is_empty());
 
         reopened.relocate(&gone("sensor.csv"), &at("other.csv")).unwrap();
-        reopened.compare().unwrap();
+        let Opened::Plan(_, reopened) = open(&reopened) else {
+            panic!("the other file is found");
+        };
         assert_eq!(reopened.changed, ["other.csv"]);
     }
 }
