@@ -10,7 +10,8 @@ use crate::window::{
     job::caught,
     preview,
     shared::{
-        Effect, FileInUse, FileTask, Look, Matter, Phase, Purpose, RecordingDraft, RunView, SourceKind, ViewKind,
+        Effect, FileInUse, FileTask, Look, Matter, Phase, Purpose, RecordingDraft, RunView, RunsRequest, SourceKind,
+        ViewKind,
     },
     theme,
     training_worker::{Inspection, LOST, Origin, Request, TrainedRun},
@@ -95,10 +96,10 @@ impl DecouplerWindow {
             Effect::Export(exporting) => self.modal = Some(Modal::Export(*exporting)),
             Effect::Copy { text, notice } => self.copy_text(text, notice),
             Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
-            Effect::KeepRun(file) => self.runs.keep(*file),
-            Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
-            Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
-            Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
+            Effect::KeepRun(file) => self.runs.ask(RunsRequest::Keep(file)),
+            Effect::RenameRun(id, name) => self.runs.ask(RunsRequest::Rename(id, name)),
+            Effect::PinRun(place, id) => self.runs.ask(RunsRequest::Pin(place, id)),
+            Effect::RemoveRun(id) => self.runs.ask(RunsRequest::Remove(id)),
             Effect::Notify(matter, notice) => self.notices.add(matter, notice),
             Effect::Settle(matter) => self.notices.settle(matter),
         }
@@ -135,7 +136,7 @@ impl DecouplerWindow {
     pub(super) fn show(&mut self, view: ViewKind) {
         self.shared.shown = view;
         // Another window may have changed the list.
-        self.runs.look();
+        self.runs.ask(RunsRequest::Look);
     }
 
     /// Sets the look of all surfaces, and remembers the colours that the user chose.

@@ -8,7 +8,7 @@ use super::{
 use crate::window::{
     job::JobError,
     preview::PreviewEvent,
-    shared::{Matter, Notice, Phase, Preview, RunView, ViewKind},
+    shared::{Matter, Notice, Phase, Preview, RunView, RunsRequest, ViewKind},
     training_worker::{Began, Event, Start},
 };
 use decoupler_core::evaluation::RunSettings;
@@ -193,7 +193,7 @@ impl DecouplerWindow {
                     run.progress(*progress);
                 }
             }
-            Event::Finished(Ok(file)) => self.runs.keep(*file),
+            Event::Finished(Ok(file)) => self.runs.ask(RunsRequest::Keep(file)),
             Event::Finished(Err(reason)) => self.notices.fail(Matter::Training, reason),
             Event::Died(reason) => {
                 match &reason {

@@ -18,7 +18,7 @@ pub use export::{
     ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, file_stem, saying_saved,
 };
 pub use offers::{FileInUse, refuse_in_use};
-pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
+pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
 pub use run_view::{RunView, run_buttons_ui, sentence, training_status};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
 pub use training_form::{Effect, Matter, Notice, combination_name, method_choice_ui, method_settings_ui, stopping_ui};
