@@ -176,22 +176,22 @@ fn notice_ui(ui: &mut Ui, entry: &Entry, replies: &[Reply]) -> Option<Reply> {
         Notice::Failed(text) => (text, palette.bad),
     };
     let frame = Frame::popup(ui.style()).stroke(Stroke::new(1.0, colour));
-    let shown = frame.inner_margin(Margin::symmetric(12, 6)).show(ui, |ui| {
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let mut reply = None;
-            for other in replies {
-                if ui.button(other.name()).clicked() {
-                    reply = Some(*other);
+    let mut reply = None;
+    frame.inner_margin(Margin::symmetric(12, 6)).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                for other in replies {
+                    if ui.button(other.name()).clicked() {
+                        reply = Some(*other);
+                    }
                 }
-            }
-            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                ui.add(Label::new(RichText::new(text).color(colour)).wrap());
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    ui.add(Label::new(RichText::new(text).color(colour)).wrap());
+                });
             });
-            reply
-        })
-        .inner
+        });
     });
-    shown.inner
+    reply
 }
 
 #[cfg(test)]

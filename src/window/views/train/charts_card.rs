@@ -1,5 +1,5 @@
 use decoupler_files::figure::{
-    Decoded, ErrorBins, Figure, HeatMap, Ink, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
+    Decoded, Figure, HeatMap, Ink, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
     hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, training_state_figure,
 };
 use eframe::egui::{Ui, UiBuilder};
@@ -168,15 +168,6 @@ impl TrainView {
                 };
                 if offers.offer(command, true) {
                     self.section.along = other;
-                }
-            }
-            (BottomTab::ErrorHistogram, _) => {
-                let bar = self.lights.bar.unwrap_or(ErrorBins::COUNT / 2);
-                for (by, command) in [(-1, Command::PreviousBar), (1, Command::NextBar)] {
-                    let next = bar.checked_add_signed(by).filter(|bar| *bar < ErrorBins::COUNT);
-                    if offers.offer(command, next.is_some() && shared.result().is_some()) {
-                        self.lights.bar = next;
-                    }
                 }
             }
             _ => {}
