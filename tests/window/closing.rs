@@ -196,12 +196,13 @@ fn a_training_on_a_recording_is_saved_at_closing() {
 
 #[test]
 fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
-    for (view, run, line) in [
-        ("Experiments", "▶ Run", "Experiments: Experiment"),
-        ("Trade-off", "▶ Measure", "Trade-off: Measurement"),
+    for (topic, run, line) in [
+        ("Table 1", "▶ Run", "Study: Table 1"),
+        ("Speed against accuracy", "▶ Measure", "Study: Speed against accuracy"),
     ] {
         let mut driver = Driver::open();
-        driver.click_button(view);
+        driver.click_button("Study");
+        driver.click(topic);
         driver.click(run);
         ask(&mut driver);
         assert!(driver.has(line), "{:#?}", driver.texts());
@@ -216,11 +217,11 @@ fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
 fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open();
-    driver.click_button("Experiments");
+    driver.click_button("Study");
     tiny(&mut driver);
     run_to_the_end(&mut driver);
     ask(&mut driver);
-    assert!(driver.has("Experiments: Table 1"), "{:#?}", driver.texts());
+    assert!(driver.has("Study: Table 1"), "{:#?}", driver.texts());
     assert!(
         driver.has("2 trials finished, not exported as a table"),
         "{:#?}",
@@ -237,12 +238,13 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
 
     let mut driver = Driver::open();
     driver.click("10×6");
-    driver.click_button("Trade-off");
+    driver.click_button("Study");
+    driver.click("Speed against accuracy");
     trading::tiny(&mut driver);
     driver.type_into("Noise levels", "0");
     trading::measure(&mut driver);
     ask(&mut driver);
-    assert!(driver.has("Trade-off: Measurement") && driver.says("not exported as a table"));
+    assert!(driver.has("Study: Speed against accuracy") && driver.says("not exported as a table"));
     driver.click_button(STAY);
     driver.save("All points, CSV", &folder.path().join("points.csv"));
     assert!(close(&mut driver));
@@ -252,20 +254,26 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
 fn a_cross_validation_and_an_analysis_are_not_ended_without_asking() {
     let (mut driver, _path, _folder) = opened(160);
     driver.limit_epochs("100000");
-    driver.click_button("Identifiability");
-    driver.click_button("Cross-validate");
+    driver.click_button("Study");
+    driver.click("Cross-validation");
+    driver.click_button("▶ Cross-validate");
     ask(&mut driver);
     assert!(
-        driver.has("Identifiability: Cross-validation") && driver.has("5 folds"),
+        driver.has("Study: Cross-validation") && driver.says("5 trainings"),
         "{:#?}",
         driver.texts()
     );
     driver.click_button(STAY);
     driver.click("■ Cancel");
     driver.settle();
-    driver.click_button("Analyse readings");
+    driver.click("What the readings determine");
+    driver.click_button("▶ Analyse");
     ask(&mut driver);
-    assert!(driver.has("Identifiability: Analysis"), "{:#?}", driver.texts());
+    assert!(
+        driver.has("Study: What the readings determine"),
+        "{:#?}",
+        driver.texts()
+    );
     driver.click_button(CLOSE);
     wait_for_closing(&mut driver);
 }

@@ -185,10 +185,11 @@ fn empty_views_fill_on_a_click() {
     driver.configure_small();
     driver.click_button("Compare");
     assert!(driver.is_enabled("Train a network now"));
-    driver.click_button("Experiments");
+    driver.click_button("Study");
     driver.settle();
     assert!(driver.is_enabled("Run now"));
-    driver.click_button("Trade-off");
+    driver.click("Speed against accuracy");
+    driver.settle();
     assert!(driver.is_enabled("Measure now"));
     driver.click_button("Train");
     driver.settle();
@@ -196,7 +197,8 @@ fn empty_views_fill_on_a_click() {
     driver.wait("the end of the training", |driver| {
         matches!(driver.state().phase, Phase::Ended(_))
     });
-    driver.click_button("Experiments");
+    driver.click_button("Study");
+    driver.click("Table 1");
     driver.click_button("Run now");
     driver.wait("the experiment", |driver| driver.is_enabled("■ Cancel"));
     driver.click("■ Cancel");
