@@ -64,7 +64,10 @@ fn a_large_array_trains() {
     driver.enter("Hidden nodes", "4");
     driver.enter("Epochs", "3");
     drawn(&mut driver);
-    assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 1600);
+    assert_eq!(
+        driver.views().train.drawn.surfaces.as_ref().unwrap().actual.nodes.len(),
+        1600
+    );
     assert_eq!(try_training(&mut driver), None);
     assert!(driver.has("Decoded surface"));
     driver.click_button("Top view");

@@ -87,7 +87,6 @@ impl DecouplerWindow {
                 }
             }
             Effect::Look(look) => self.look(look),
-            Effect::Watch(snapshot) => self.worker.watch(snapshot),
             Effect::ChooseFile(task) => {
                 if !self.dialogs.ask(&task) {
                     self.type_path(task);

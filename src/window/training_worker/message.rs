@@ -4,7 +4,7 @@ use std::{
     path::PathBuf,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
+        atomic::{AtomicU64, Ordering},
         mpsc::{Sender, channel},
     },
     time::Duration,
@@ -29,7 +29,7 @@ use ndarray::Array2;
 use super::{calibration::Calibration, keeping::Keeping, past_networks::PastNetworks, training_loop::TrainingLoop};
 use crate::window::{
     job::{Background, JobError, Wake},
-    test_view::{Frame, TargetCharts, TestSet},
+    test_view::{TargetCharts, TestSet},
 };
 
 /// Request from the window to the worker.
@@ -219,8 +219,6 @@ pub struct RunResult {
     pub charts: Option<Arc<TargetCharts>>,
     /// Remarks on the errors of a recording, when the training is paused or has ended.
     pub remarks: Vec<String>,
-    /// Displayed snapshot and its surface, which is interpolated here to spare the window.
-    pub frame: Option<(usize, Frame)>,
     /// Errors of the decoded values.
     pub errors: TestErrors,
     /// Errors of the network alone, if a combination is used.
@@ -292,8 +290,6 @@ pub struct Worker {
 pub(super) struct Watched {
     /// Number of the training last asked for: the preparations of others are cancelled.
     pub(super) newest: AtomicU64,
-    /// Displayed snapshot.
-    pub(super) snapshot: AtomicUsize,
 }
 
 impl Worker {
@@ -373,11 +369,6 @@ impl Worker {
         }
         // The receiver is dropped only if the worker died.
         let _ = self.requests().send(request);
-    }
-
-    /// Selects the snapshot whose surface is part of later results.
-    pub fn watch(&self, snapshot: usize) {
-        self.watched.snapshot.store(snapshot, Ordering::Relaxed);
     }
 
     /// Returns true while a training is being prepared and not cancelled.

@@ -356,7 +356,7 @@ impl<'a> TrainingLoop<'a> {
     /// Reports the progress of the training.
     fn publish(&mut self) {
         let Some(current) = &mut self.current else { return };
-        let progress = current.progress(self.watched.snapshot.load(Ordering::Relaxed));
+        let progress = current.progress();
         self.report
             .progress(Event::Progressed(Box::new(progress)), |older, newer| {
                 if let (Event::Progressed(older), Event::Progressed(newer)) = (older, newer) {
@@ -374,7 +374,7 @@ impl Training {
     }
 
     /// Returns its state, with the epochs since the last report.
-    fn progress(&mut self, watched: usize) -> Progress {
+    fn progress(&mut self) -> Progress {
         let begun = Instant::now();
         let run = &self.trained.run;
         let leader = run.leader_number();
@@ -383,10 +383,6 @@ impl Training {
         let answers = run.decouple_test();
         let errors = run.errors_of(&answers);
         let network_alone = run.scores().and_then(|scores| scores.network_alone);
-        let frame = self.test.array().map(|test| {
-            let snapshot = test.nearest_snapshot(watched);
-            (snapshot, test.frame(answers.view(), snapshot))
-        });
         let charts = self.test.recording().map(|test| Arc::new(test.charts(&answers)));
         let cost = begun.elapsed();
         let is_calibrating = self.stage == Stage::Calibrating;
@@ -415,7 +411,6 @@ impl Training {
                     .unwrap_or_default(),
                 answers: Arc::new(answers),
                 charts,
-                frame,
                 errors,
                 network_alone,
                 coverage: run.coverage().to_vec(),

@@ -167,10 +167,10 @@ pub(super) const NODES: Chart = Chart {
     name: "Nodes",
     draw: |view, shared| {
         let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
-        let frames = view.frames();
-        let decoded_mm = frames.decoupled.as_ref().map(|(decoded, _)| &*decoded.nodes_mm);
+        let drawing = view.drawing()?;
+        let decoded_mm = drawing.decoded.as_ref().map(|[decoded, _]| &*decoded.nodes);
         let bars_mm = view.has_error_bars.then(|| view.drawn.spread_mm()).flatten();
-        Some(node_figure(&frames.actual.nodes_mm, decoded_mm, bars_mm, nodes_per_row).into())
+        Some(node_figure(&drawing.actual.nodes, decoded_mm, bars_mm, nodes_per_row).into())
     },
     items: Items::Nodes,
     bar_ui: |ui, view, shared| {
@@ -184,7 +184,7 @@ pub(super) const NODES: Chart = Chart {
 
 pub(super) const SECTION: Chart = Chart {
     name: "Section",
-    draw: |view, shared| Some(section_of(&view.section, shared.test()?, view.frames(), shared.look).into()),
+    draw: |view, shared| Some(section_of(&view.section, shared.test()?, view.drawing()?, shared.look).into()),
     items: Items::Nodes,
     bar_ui: |ui, view, shared| {
         if let Some(test) = shared.test() {
@@ -325,9 +325,9 @@ fn lit_value(view: &TrainView, shared: &Shared) -> Option<[f64; 2]> {
         let answers = &view.result(shared)?.answers;
         return Some([*test.set.targets().get(at)?, *answers.get(at)?]);
     }
-    let (frames, node) = (view.frames(), view.lights.node?);
-    let (decoded, _) = frames.decoupled.as_ref()?;
-    Some([frames.actual.nodes_mm.get(node)?.z, decoded.nodes_mm.get(node)?.z])
+    let (drawing, node) = (view.drawing()?, view.lights.node?);
+    let [decoded, _] = drawing.decoded.as_ref()?;
+    Some([drawing.actual.nodes.get(node)?.z, decoded.nodes.get(node)?.z])
 }
 
 /// Returns the nodes of the row-wire that is pointed at, which are lit together.

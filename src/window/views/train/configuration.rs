@@ -8,7 +8,10 @@ use decoupler_core::{
 };
 use eframe::egui::{Button, Ui};
 
-use super::{exports::PaperFigure, recording::RecordingEditor};
+use super::{
+    exports::{PAPER_FIGURES, PaperFigure},
+    recording::RecordingEditor,
+};
 use crate::window::{
     forms::{self, Fields, SetBy},
     glossary,
@@ -183,9 +186,9 @@ fn paper_figures_ui(ui: &mut Ui) -> Option<PaperFigure> {
     let width = 0.5 * (ui.available_width() - space(1));
     ui.spacing_mut().item_spacing = [space(1); 2].into();
     ui.horizontal_wrapped(|ui| {
-        for figure in PaperFigure::ALL {
-            let button = ghost_button(figure.name()).min_size([width, space(7)].into());
-            if ui.add(button).on_hover_text(figure.description()).clicked() {
+        for figure in PAPER_FIGURES {
+            let button = ghost_button(figure.name).min_size([width, space(7)].into());
+            if ui.add(button).on_hover_text(figure.description).clicked() {
                 picked = Some(figure);
             }
         }

@@ -148,13 +148,9 @@ fn result_at(
 ) -> Option<RunResult> {
     let past = past.at(epoch, &present.networks)?;
     let answers = ProgramDecoder::new(past.networks.decoder_program(problem, None)).answers_to(test.set());
-    // The displayed snapshot is decoded too, as in the results of the training itself.
-    let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
-    let frame = |array: &crate::window::test_view::TestView| (snapshot, array.frame(answers.view(), snapshot));
     Some(RunResult {
         errors: TestErrors::measure(problem, test.set(), &answers),
         network_alone: None,
-        frame: test.array().map(frame),
         charts: test.recording().map(|test| Arc::new(test.charts(&answers))),
         remarks: Vec::new(),
         coverage: Vec::new(),
