@@ -143,9 +143,7 @@ impl RunView {
         append_epochs(&mut self.history, epochs);
         self.stages = stages;
         self.past = past;
-        if let Some(starts) = starts {
-            self.starts = starts;
-        }
+        self.starts = starts;
         self.result = Some(result);
     }
 
