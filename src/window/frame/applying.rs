@@ -112,7 +112,16 @@ impl DecouplerWindow {
         self.shared.phase = Phase::Preparing;
         self.notices.settle(Matter::Training);
         self.notices.settle(Matter::Settings);
+        if self.worker.has_died() {
+            self.restart_worker();
+        }
         self.worker.begin(origin);
+    }
+
+    /// Starts the worker again after it died.
+    pub(super) fn restart_worker(&mut self) {
+        self.worker.restart(Arc::clone(&self.wake));
+        self.keep_trainings();
     }
 
     /// Chooses settings automatically from now on, or begins with those that were chosen.
@@ -222,14 +231,6 @@ impl DecouplerWindow {
             Purpose::Open if self.shared.phase.is_busy() => {}
             Purpose::Open => self.begin(Origin::File(path)),
         }
-    }
-
-    /// Starts the worker again after it died.
-    pub(super) fn restart_worker(&mut self) {
-        self.worker.restart(Arc::clone(&self.wake));
-        self.keep_trainings();
-        self.shared.phase = self.shared.phase_at_rest();
-        self.notices.settle(Matter::Training);
     }
 
     /// Takes new settings; if they change the test set, shows that of the new ones.

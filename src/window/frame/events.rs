@@ -187,10 +187,9 @@ impl DecouplerWindow {
             Event::Finished(Ok(file)) => self.runs.ask(RunsRequest::Keep(file)),
             Event::Finished(Err(reason)) => self.notices.fail(Matter::Training, reason),
             Event::Died(reason) => {
-                match &reason {
-                    // The next training needs a thread.
-                    Some(JobError::Panicked { .. }) => self.restart_worker(),
-                    _ => shared.phase = Phase::Died,
+                shared.phase = shared.phase_at_rest();
+                if matches!(reason, Some(JobError::Panicked { .. })) {
+                    self.restart_worker();
                 }
                 let reason = reason.map(|error| format!(": {error}")).unwrap_or_default();
                 let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");

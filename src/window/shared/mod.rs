@@ -13,7 +13,7 @@ mod training_form;
 mod view;
 
 pub use super::training_worker::RunResult;
-pub use command::{Command, Offer, Offers};
+pub use command::{About, Command, Offer, Offers};
 pub use error_table::error_table_ui;
 pub use export::{
     ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, file_stem, saying_saved,

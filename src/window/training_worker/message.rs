@@ -289,6 +289,11 @@ impl Worker {
         }
     }
 
+    /// Returns true if the thread has ended.
+    pub fn has_died(&self) -> bool {
+        !self.job.is_under_way()
+    }
+
     /// Starts another thread after this one has died.
     pub fn restart(&mut self, wake: Wake) {
         let new = Self::start(wake);

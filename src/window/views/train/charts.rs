@@ -16,7 +16,7 @@ use super::{
 };
 use crate::window::{
     plotting::{Pointer, cells_ui, plots_ui},
-    shared::{Command, Effect, Offers, Phase, RunResult, RunView, Shared, SourceKind, target_choice_ui},
+    shared::{Command, Effect, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
     test_view::{Positions, TargetCharts},
     theme::{Theme, space},
     widgets::{invitation_ui, tabs_ui},
@@ -382,7 +382,7 @@ pub fn charts_card_ui(
         place.max.y -= scrub::HEIGHT;
     }
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
-        let is_possible = !shared.phase.is_busy() && shared.phase != Phase::Died;
+        let is_possible = !shared.phase.is_busy();
         if chart.name == READINGS.name {
             readings_of_view_ui(ui, view, shared);
         } else if let Some(figure) = chart.figure(view, shared) {

@@ -117,7 +117,7 @@ fn settings_ui(
     ui.add_enabled_ui(is_open, |ui| forms::training_ui(ui, fields, is_new));
     let mut picked = None;
     if !is_recording {
-        ui.add_enabled_ui(is_new && phase != Phase::Died, |ui| {
+        ui.add_enabled_ui(is_new, |ui| {
             fold_ui(ui, "Figures of the paper", "", |ui| picked = paper_figures_ui(ui));
         });
     }

@@ -237,7 +237,6 @@ fn figures(problem: &Problem, has_model_based: bool) -> Vec<Figure> {
 pub fn decoders_ui(
     ui: &mut Ui,
     decoders: &mut Decoders,
-    phase: Phase,
     (problem, model_based): (&Problem, Option<&Errors>),
     target: &mut usize,
     source: Option<&NetworkSource>,
@@ -246,12 +245,9 @@ pub fn decoders_ui(
     ui.add_space(space(1));
     let header = CollapsingHeader::new("More decoders")
         .open(Some(decoders.is_open))
-        .show(ui, |ui| match (&decoders.measured, phase) {
-            (Some(measured), _) => asked = measured_ui(ui, measured, (problem, model_based), target, source),
-            (None, Phase::Died) => {
-                dim_ui(ui, "The network was lost with the training thread: train again.");
-            }
-            (None, _) => {
+        .show(ui, |ui| match &decoders.measured {
+            Some(measured) => asked = measured_ui(ui, measured, (problem, model_based), target, source),
+            None => {
                 dim_ui(ui, "They are measured when the training is paused or has ended.");
             }
         });
@@ -414,7 +410,7 @@ mod tests {
         let mut decoders = Decoders::new(Arc::new(|| ()));
         (decoders.is_open, decoders.measured) = (true, Some(measured));
         Harness::new_ui(move |ui| {
-            decoders_ui(ui, &mut decoders, Phase::Idle, (&problem, None), &mut 0, None);
+            decoders_ui(ui, &mut decoders, (&problem, None), &mut 0, None);
         })
     }
 

@@ -103,7 +103,6 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     shown.push(Shown::table("Decoder table", stem("decoders"), decoders));
     let standing = run.and_then(|run| match shared.phase {
         Phase::Paused | Phase::Calibrating | Phase::Ended(_) => Ok(checkpoint_task(run)),
-        Phase::Died => Err("The training was lost with its thread: train again.".to_owned()),
         _ => Err("A training under way cannot be saved: pause it first.".to_owned()),
     });
     shown.push(Shown::file("Checkpoint", standing));

@@ -66,7 +66,7 @@ impl View for TrainView {
         let can_pause = matches!(phase, Phase::Training | Phase::Paused);
         let open = Effect::ChooseFile(self.recording.open_task());
         for (command, is_possible, effect) in [
-            (Command::Train, shared.can_train(), Effect::Train),
+            (Command::Train, !phase.is_busy(), Effect::Train),
             (Command::TrainLonger, shared.can_continue(), Effect::Continue),
             (pause, can_pause, paused),
             (Command::StopTraining, phase.is_busy(), Effect::Stop),
