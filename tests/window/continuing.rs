@@ -19,7 +19,7 @@ use crate::{
 };
 
 const SAVE: &str = "Checkpoint, resumable";
-const OPEN: &str = "Type the path of a checkpoint";
+const OPEN: &str = "Open checkpoint…";
 
 /// Types `path` into the form behind `button` and confirms.
 fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
@@ -153,7 +153,8 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
         driver.click("▶ Train");
         driver.wait_for_epochs(5);
         driver.open_menu();
-        assert!(!driver.is_enabled(SAVE), "a training is paused first");
+        driver.choose_export(SAVE);
+        assert!(!driver.is_enabled("Save…"), "a training is paused first");
         assert!(driver.says("A training under way cannot be saved"));
         driver.press(eframe::egui::Key::Escape);
         pause(driver);

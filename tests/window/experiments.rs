@@ -156,7 +156,7 @@ fn before_it_is_run_a_table_shows_the_published_figures() {
     assert!(driver.says("Our figures appear next to"));
     assert!(!driver.is_enabled(OPEN));
     driver.open_menu();
-    assert!(!driver.is_enabled("Figure, SVG") && driver.says("No trial has finished yet"));
+    assert!(!driver.is_enabled("Figure…") && driver.says("No trial has finished yet"));
     driver.press(eframe::egui::Key::Escape);
     // The typed values determine what would be filled in.
     driver.type_into("Hidden nodes", "12, 99");
@@ -240,7 +240,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     }
     driver.settle();
     for (button, name, expected) in [
-        ("Table, CSV", "cells.csv", "array,hidden,samples"),
+        ("Every cell, CSV", "cells.csv", "array,hidden,samples"),
         ("Every trial, CSV", "trials.csv", "array,hidden,samples"),
         ("Table with settings, Markdown", "table.md", "## Sweep over two axes"),
     ] {

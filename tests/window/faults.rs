@@ -154,7 +154,7 @@ fn exports_at_every_fault() {
                         assert!(reason.contains(name), "{place}: {reason}");
                         assert!(names(&folder).is_empty(), "{place}: {:?}", names(&folder));
                     }
-                    Some(Notice::Done(_)) => assert_eq!(names(&folder), [*name], "{place}"),
+                    Some(Notice::Done(_) | Notice::Saved(..)) => assert_eq!(names(&folder), [*name], "{place}"),
                     None => panic!("{place}"),
                 }
                 let _ = fs::remove_dir_all(&path);

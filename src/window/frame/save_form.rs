@@ -92,6 +92,7 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     let id = Id::unique("path of a file");
     let edit = TextEdit::singleline(&mut saving.path).id(id);
     let edit = ui.add(edit.desired_width(f32::INFINITY)).labelled_by(label.id);
+    let has_entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     // Typing and Enter are enough; Tab still reaches the buttons.
     if ui.memory(|memory| memory.focused().is_none()) {
         edit.request_focus();
@@ -106,7 +107,7 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     if edit.changed() {
         saving.tried = None;
     }
-    edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter))
+    has_entered
 }
 
 fn buttons_ui(ui: &mut Ui, saving: &Saving, has_entered: bool) -> Option<Reply> {

@@ -250,25 +250,17 @@ impl Format {
     /// Returns words for its file, or its description for a copy.
     pub fn words(self) -> FileWords {
         let (kind, description, extensions): (_, _, &[_]) = match self {
-            Self::Bundle(BundleFormat::Onnx) => (
-                "ONNX graph",
-                "A folder with the decoder as an ONNX graph (opset 13) and golden readings: readings in, targets out.",
-                &[],
-            ),
-            Self::Bundle(BundleFormat::C99) => (
-                "C99 program",
-                "A folder with one header and one source in C99 and a self-test: readings in, targets out. fixed16 uses \
-                 integer arithmetic only, for microcontrollers.",
-                &[],
-            ),
-            Self::Bundle(BundleFormat::Matlab) => (
-                "function for MATLAB and Octave",
-                "A folder with one function file for MATLAB and GNU Octave and golden readings: readings in, targets out.",
-                &[],
-            ),
-            Self::Bundle(BundleFormat::NumPy) => (
-                "program for NumPy",
-                "A folder with the weights as .npz, a short decode.py and golden readings: readings in, targets out.",
+            Self::Bundle(format) => (
+                format.title(),
+                match format {
+                    BundleFormat::Onnx => "A folder with an ONNX graph (opset 13) and golden readings.",
+                    BundleFormat::C99 => {
+                        "A folder with one header and one source in C99 and a self-test. fixed16 uses \
+                                          integer arithmetic only, for microcontrollers."
+                    }
+                    BundleFormat::Matlab => "A folder with one function for MATLAB and GNU Octave and golden readings.",
+                    BundleFormat::NumPy => "A folder with the weights, a short decode.py and golden readings.",
+                },
                 &[],
             ),
             Self::NetworkFile => (
@@ -295,17 +287,14 @@ impl Format {
             ),
             Self::Picture => ("picture", "As shown, on a light background: pixels at 300 dpi.", &[]),
             Self::Csv => ("table", "With every digit.", &["csv"]),
-            Self::Copy(TableForm::Markdown) => ("table", "Numbers with three significant digits.", &[]),
-            Self::Copy(TableForm::Latex) => (
+            Self::Copy(form) => (
                 "table",
-                "For the packages booktabs and siunitx: numbers with three significant digits, aligned at the decimal \
-                 point.",
-                &[],
-            ),
-            Self::Copy(TableForm::TabSeparated) => ("table", "Numbers with every digit, for spreadsheets.", &[]),
-            Self::Copy(TableForm::Json) => (
-                "table",
-                "An array with an object for each row, numbers with every digit.",
+                match form {
+                    TableForm::Markdown => "Numbers with three significant digits.",
+                    TableForm::Latex => "For booktabs and siunitx: numbers with three significant digits.",
+                    TableForm::TabSeparated => "Numbers with every digit, for spreadsheets.",
+                    TableForm::Json => "An array with an object for each row, numbers with every digit.",
+                },
                 &[],
             ),
             Self::Own(words) => return words,
@@ -673,4 +662,26 @@ pub fn file_stem(what: &str, setup: &Setup) -> String {
         starts => format!("-starts{starts}"),
     };
     format!("{what}-{source}-h{hidden}-{method}{starts}-seed{}", settings.seed)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_taken_is_followed_by_the_next_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        assert_eq!(free_path(&at("loss.csv")), at("loss.csv"));
+        for name in ["loss.csv", "loss-2.csv", "net/file"] {
+            fs::create_dir_all(at(name).parent().unwrap()).unwrap();
+            fs::write(at(name), "").unwrap();
+        }
+        assert_eq!(free_path(&at("loss.csv")), at("loss-3.csv"));
+        assert_eq!(free_path(&at("net")), at("net-2"));
+        fs::create_dir(at("net-2")).unwrap();
+        assert_eq!(free_path(&at("net")), at("net-2"), "an empty folder is free");
+    }
 }

@@ -386,9 +386,9 @@ impl TrainView {
         let settings = figure.settings();
         effects.push(Effect::Configure(Box::new(settings)));
         self.right = RightCard::Decoupled;
-        self.tab = figure.tab().unwrap_or(self.tab);
-        if let Some(mode) = figure.mode() {
-            effects.push(Effect::Look(Look { mode, ..shared.look }));
+        match figure.mode {
+            Some(mode) => effects.push(Effect::Look(Look { mode, ..shared.look })),
+            None => self.tab = BottomTab::Nodes,
         }
         let is_complete = |run: &RunView| {
             let was_stopped = run.stop_reason == Some(StopReason::Stopped);

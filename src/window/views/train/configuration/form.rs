@@ -261,8 +261,8 @@ fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
     for pair in PaperFigure::ALL.chunks(2) {
         ui.horizontal(|ui| {
             for figure in pair {
-                let button = ghost_button(figure.name()).min_size([width, space(7)].into());
-                if ui.add(button).on_hover_text(figure.description()).clicked() {
+                let button = ghost_button(figure.name).min_size([width, space(7)].into());
+                if ui.add(button).on_hover_text(figure.description).clicked() {
                     picked = Some(*figure);
                 }
             }
