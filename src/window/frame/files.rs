@@ -22,8 +22,8 @@ use super::{
     remembered::{MIN_SIZE_POINTS, Remembered, WindowFile},
 };
 use crate::window::{
-    job::{Background, JobError, Wake},
-    shared::{Effect, FileInUse, FileTask, refuse_in_use},
+    job::{Background, JobError, Wake, start_thread},
+    shared::{FileInUse, FileTask, Matter, ViewKind, refuse_in_use},
     theme::{Theme, radius, space, type_size},
 };
 
@@ -156,7 +156,8 @@ pub(super) fn open_folder(path: &Path) {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let mut command = std::process::Command::new(program);
     command.arg(folder.unwrap_or(Path::new(".")));
-    std::thread::spawn(move || command.status());
+    // Without another thread nothing is shown either.
+    let _ = start_thread("folder", move || command.status(), |_| ());
 }
 
 /// A dialog answered sooner than this was never shown: the desktop has none. The limit allows for a busy machine; a user
@@ -209,11 +210,6 @@ impl Dialogs {
     /// Returns the next answer, if one has come, with its task.
     pub fn next_answer(&mut self) -> Option<(FileTask, Answer)> {
         self.asked.next()
-    }
-
-    /// Returns true while a dialog is open.
-    pub fn is_asking(&self) -> bool {
-        !self.asked.jobs.is_empty()
     }
 }
 
@@ -328,32 +324,31 @@ fn without_source_line(message: &str) -> String {
 
 impl DecouplerWindow {
     /// Gives files dropped on the window to the view that takes them, and shows it.
-    pub(super) fn take_dropped(&mut self, ctx: &Context, effects: &mut Vec<Effect>) {
+    pub(super) fn take_dropped(&mut self, ctx: &Context) {
         let dropped = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
         let mut paths: Vec<PathBuf> = dropped.iter().map(|file| file.path().to_owned()).collect();
         // A question must be answered first.
-        if self.is_asked() {
+        if self.modal.is_some() {
             return;
         }
         paths.append(&mut self.given);
         if paths.is_empty() {
             return;
         }
-        let place = self
-            .views
-            .all()
-            .into_iter()
-            .position(|view| view.take_files(&paths, &self.shared, effects));
-        if let Some(place) = place {
-            self.show(place);
-            ctx.request_repaint();
+        if self.shared.phase.is_busy() {
+            let text = "A training is running: stop it before you open other files.";
+            self.notices.fail(Matter::Recording, text);
+        } else {
+            self.views.open_files(paths);
         }
+        self.show(ViewKind::Train);
+        ctx.request_repaint();
     }
 
     /// Shows over the window what dropping the files under the pointer will do.
     pub(super) fn dropping_ui(&self, ui: &Ui) {
         let is_hovered = ui.input(|input| !input.raw.hovered_files.is_empty());
-        if !is_hovered || self.is_asked() {
+        if !is_hovered || self.modal.is_some() {
             return;
         }
         let palette = Theme::of(ui).palette;

@@ -8,7 +8,7 @@ use eframe::egui::{
 
 use super::remembered::Remembered;
 use crate::window::{
-    shared::{Action, Columns},
+    shared::{Columns, Command, Offer, ViewKind},
     theme::{Theme, semibold, space, type_size},
     widgets::{ghost_button, segmented_ui},
 };
@@ -22,27 +22,14 @@ const TIGHT: f32 = 1100.0;
 /// Width below which the mark is left out.
 const NARROW: f32 = 1000.0;
 
-/// Names of the actions that change the theme.
-pub(super) const LIGHT: &str = "Light theme";
-pub(super) const DARK: &str = "Dark theme";
-
-/// Click of the user in the top bar.
-pub(super) enum Reach {
-    /// The view in this place.
-    View(usize),
-    /// The action of this name.
-    Action(String),
-}
-
 /// Name, views, and the tools of the displayed view, which `tools_ui` lays out from right to left, before the tools of the
-/// window itself.
+/// window itself. Returns the command that the user clicked.
 pub(super) fn top_bar_ui(
     ui: &mut Ui,
-    views: &[(usize, &str)],
-    shown: usize,
-    actions: &[Action],
+    shown: ViewKind,
+    offers: &[Offer],
     tools_ui: impl FnOnce(&mut Ui),
-) -> Option<Reach> {
+) -> Option<Command> {
     ui.horizontal_centered(|ui| {
         ui.add_space(space(1));
         let width = ui.available_width();
@@ -60,27 +47,25 @@ pub(super) fn top_bar_ui(
             if width < TIGHT {
                 ui.spacing_mut().button_padding.x = space(1);
             }
-            segmented_ui(ui, "View", views, shown, false)
+            let views = ViewKind::ALL.map(|view| (view, view.name()));
+            segmented_ui(ui, "View", &views, shown, false)
         };
-        let picked = ui.scope(views_ui).inner.map(Reach::View);
+        let picked = ui.scope(views_ui).inner.map(Command::Show);
         let reached = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let mut reached = None;
-            let mut button_ui = |ui: &mut Ui, name: &str, text: &str| {
-                reached = reached.take().or(action_button_ui(ui, actions, name, text));
+            let mut button_ui = |ui: &mut Ui, command: Command, text: &str| {
+                reached = reached.take().or(command_button_ui(ui, offers, command, text));
             };
-            button_ui(ui, "Keys", "?");
-            if is_wide {
-                let (text, name) = if Theme::of(ui).is_dark {
-                    ("Light", LIGHT)
-                } else {
-                    ("Dark", DARK)
-                };
-                button_ui(ui, name, text);
+            button_ui(ui, Command::Keys, "?");
+            if is_wide && Theme::of(ui).is_dark {
+                button_ui(ui, Command::Light, "Light");
+            } else if is_wide {
+                button_ui(ui, Command::Dark, "Dark");
             }
-            button_ui(ui, "Search actions", if is_wide { "Search" } else { "…" });
+            button_ui(ui, Command::Search, if is_wide { "Search" } else { "…" });
             if is_wide {
-                button_ui(ui, "Redo change of settings", "↻");
-                button_ui(ui, "Undo change of settings", "↺");
+                button_ui(ui, Command::Redo, "↻");
+                button_ui(ui, Command::Undo, "↺");
                 ui.add_space(space(2));
             }
             tools_ui(ui);
@@ -91,16 +76,18 @@ pub(super) fn top_bar_ui(
     .inner
 }
 
-/// A small button for an action of the window, with its name and its keys under the pointer.
-fn action_button_ui(ui: &mut Ui, actions: &[Action], name: &str, text: &str) -> Option<Reach> {
-    let action = actions.iter().find(|action| action.name == name)?;
-    let keys = action.keys.map(|keys| ui.ctx().format_shortcut(&keys));
-    let hint = keys.map_or_else(|| format!("{name}."), |keys| format!("{name} ({keys})."));
-    let button = ui.add_enabled(action.is_possible, ghost_button(text));
-    let is_possible = action.is_possible;
-    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, name));
+/// A small button for a command of the window, with its name and its keys under the pointer.
+fn command_button_ui(ui: &mut Ui, offers: &[Offer], command: Command, text: &str) -> Option<Command> {
+    let is_possible = offers.iter().any(|offer| offer.command == command && offer.is_possible);
+    let about = command.about();
+    let hint = match about.keys {
+        Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
+        None => format!("{}.", about.name),
+    };
+    let button = ui.add_enabled(is_possible, ghost_button(text));
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &about.name));
     let button = button.on_hover_text(&hint).on_disabled_hover_text(&hint);
-    button.clicked().then(|| Reach::Action(name.to_owned()))
+    button.clicked().then_some(command)
 }
 
 fn mark_ui(ui: &mut Ui) {

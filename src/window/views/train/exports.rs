@@ -7,12 +7,12 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{decoder_table, error_table, loss_table},
-    figure::{Figure, surface::ViewMode},
+    figure::surface::ViewMode,
 };
 
 use super::{
-    charts_card::{all_targets_figure, chart, has_target_surface},
-    surfaces::surface_figure,
+    charts::{NODES, has_target_surface, shown_chart},
+    surfaces::upper_figure,
     view::TrainView,
 };
 use crate::window::{
@@ -75,11 +75,16 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     };
     let surfaces = run.clone().map(|_| || upper_figure(view, shared));
     shown.push(Shown::figure(name, stem(what), surfaces));
-    let chart = run.clone().and_then(|_| {
-        let figure = Figure::from(chart(view, shared).ok_or("This chart has nothing to show yet.")?);
+    let (chart, figure) = shown_chart(view, shared);
+    let figure = run.clone().and_then(|_| {
+        let figure = figure.ok_or("This chart has nothing to show yet.")?;
         Ok(move || figure.clone())
     });
-    shown.push(Shown::figure("Chart", stem(view.tab.file_word()), chart));
+    shown.push(Shown::figure(
+        "Chart",
+        stem(&chart.to_lowercase().replace(' ', "-")),
+        figure,
+    ));
     let errors = trained.map(|(run, latest)| {
         let result = view.result(shared).unwrap_or(latest);
         move || error_table(&run.error_table(result))
@@ -103,15 +108,6 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     });
     shown.push(Shown::file("Checkpoint", standing));
     shown
-}
-
-/// Returns the figure above the charts: the surfaces, or all targets of a sample.
-fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
-    let surfaces = surface_figure(view, shared);
-    match all_targets_figure(view, shared) {
-        Some(targets) if surfaces.surfaces.is_empty() => targets.into(),
-        _ => surfaces.into(),
-    }
 }
 
 /// Returns the best network, and before it that of the `past` epoch while it is displayed.
@@ -146,55 +142,78 @@ fn measured(view: &TrainView) -> Vec<DecoderReport> {
 }
 
 /// A figure of the paper that the window can show: its configuration, and how its results are displayed.
-#[derive(Clone, Copy, Debug)]
-pub struct PaperFigure {
-    /// Its array and how it is displayed.
-    pub name: &'static str,
-    /// Description in a sentence or two.
-    pub description: &'static str,
-    /// How its surfaces are viewed; `None` if it shows none.
-    pub mode: Option<ViewMode>,
-    scale: &'static str,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PaperFigure {
+    /// Surfaces of 10×10_5×30 from above.
+    Four,
+    /// Nodes of 10×6_3×18.
+    Six,
+    /// Surfaces of 10×6_3×18 in space.
+    Seven,
+    /// The same from above.
+    Eight,
 }
 
 impl PaperFigure {
     /// In the paper's order.
-    pub const ALL: [Self; 4] = [
-        Self {
-            name: "10×10, top view",
-            description: "Fig. 4: trains 10×10_5×30 with 12 hidden nodes and shows actual and decoded surface from above. \
-                          Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
-            mode: Some(ViewMode::Top),
-            scale: "10×10_5×30",
-        },
-        Self {
-            name: "10×6, nodes",
-            description: "Fig. 6: trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoded as \
-                          discs.",
-            mode: None,
-            scale: "10×6_3×18",
-        },
-        Self {
-            name: "10×6, 3-D",
-            description: "Fig. 7: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoded surface in space. \
-                          Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
-            mode: Some(ViewMode::ThreeD),
-            scale: "10×6_3×18",
-        },
-        Self {
-            name: "10×6, top view",
-            description: "Fig. 8: the same from above.",
-            mode: Some(ViewMode::Top),
-            scale: "10×6_3×18",
-        },
-    ];
+    pub const ALL: [Self; 4] = [Self::Four, Self::Six, Self::Seven, Self::Eight];
+
+    /// Returns its array and how it is displayed.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Four => "10×10, top view",
+            Self::Six => "10×6, nodes",
+            Self::Seven => "10×6, 3-D",
+            Self::Eight => "10×6, top view",
+        }
+    }
+
+    /// Returns a description of the figure in a sentence.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Four => {
+                "Fig. 4: trains 10×10_5×30 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
+                 paper's spline, ours includes a plane: level nodes give a level surface."
+            }
+            Self::Six => {
+                "Fig. 6: trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoupled as \
+                 discs."
+            }
+            Self::Seven => {
+                "Fig. 7: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface in space. Unlike the \
+                 paper's spline, ours includes a plane: level nodes give a level surface."
+            }
+            Self::Eight => {
+                "Fig. 8: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
+                 paper's spline, ours includes a plane: level nodes give a level surface."
+            }
+        }
+    }
 
     /// Returns the settings of the training for the figure.
     pub fn settings(self) -> RunSettings {
-        let scale = self.scale.parse().expect("the paper's arrays are possible");
+        let scale = match self {
+            Self::Four => "10×10_5×30",
+            Self::Six | Self::Seven | Self::Eight => "10×6_3×18",
+        };
+        let scale = scale.parse().expect("the paper's arrays are possible");
         RunSettings::from(Simulation {
             sensor: SensorModel::new(scale),
             ..Simulation::default()
         })
+    }
+
+    /// Returns how its surfaces are viewed; `None` if it shows none.
+    pub fn mode(self) -> Option<ViewMode> {
+        match self {
+            Self::Four | Self::Eight => Some(ViewMode::Top),
+            Self::Seven => Some(ViewMode::ThreeD),
+            Self::Six => None,
+        }
+    }
+
+    /// Returns its chart; `None` if it shows none.
+    pub fn tab(self) -> Option<&'static str> {
+        (self == Self::Six).then_some(NODES.name)
     }
 }
