@@ -173,20 +173,16 @@ impl<'a> Shown<'a> {
             (Item::Network(source), _) => source.network_file(),
             (Item::Report(source, decoders), _) => source.report(decoders.clone()),
             (Item::Figure(_, figure), Format::Picture) => {
-                return Some(Effect::CopyPicture {
-                    figure: Box::new(figure()),
-                    notice: format!("Copied the {name} as a picture"),
-                });
+                let picture = ToCopy::Picture(Box::new(figure()));
+                return Some(Effect::Copy(picture, format!("Copied the {name} as a picture")));
             }
             (Item::Figure(stem, figure), _) => {
                 let figure = figure();
                 FileTask::save(format.words(), stem, move |path| figure.draw().save(path))
             }
             (Item::Table(_, table), Format::Copy(form)) => {
-                return Some(Effect::Copy {
-                    text: table().text(form),
-                    notice: format!("Copied the {name} as {form}"),
-                });
+                let text = ToCopy::Text(table().text(form));
+                return Some(Effect::Copy(text, format!("Copied the {name} as {form}")));
             }
             (Item::Table(stem, table), _) => {
                 let (table, saved) = (table(), self.saved.clone());
@@ -305,6 +301,15 @@ impl Format {
             extensions,
         }
     }
+}
+
+/// Something to be copied.
+#[derive(Clone, Debug)]
+pub enum ToCopy {
+    /// Text as it is.
+    Text(String),
+    /// A picture, still to be drawn.
+    Picture(Box<Figure>),
 }
 
 /// An export that the user chooses in a dialog.
@@ -453,11 +458,6 @@ impl FileTask {
         }
     }
 
-    /// Returns true if `other` asks for the same file.
-    pub fn is_same_file(&self, other: &Self) -> bool {
-        (self.words, &self.suggestion) == (other.words, &other.suggestion)
-    }
-
     /// Returns true if the file is read, not written.
     pub fn is_read(&self) -> bool {
         !matches!(self.purpose, Purpose::Save(_))
@@ -567,25 +567,22 @@ impl NetworkSource {
     }
 
     fn bundle(&self, decoder: BundleDecoder, format: BundleFormat, precision: BundlePrecision) -> FileTask {
+        let what = if decoder.is_network() {
+            format!("{format}-{precision}")
+        } else {
+            format!("{decoder}-{format}-{precision}")
+        };
         let words = Format::Bundle(format).words();
         let write = move |exported: Result<ExportedDecoder, BundleError>, path: &Path| {
             let report = exported.and_then(|exported| export_bundle(exported, format, precision, &free_path(path)));
             report.map(|report| said_of(&report)).map_err(|error| error.to_string())
         };
-        if decoder.is_network() {
-            return self.task((words, &format!("{format}-{precision}")), move |file, _| {
-                Box::new(move |path| write(Ok(ExportedDecoder::from(&*file)), path))
-            });
-        }
-        let what = format!("{decoder}-{format}-{precision}");
         let Self::Samples(setup, recorded) = self else {
             return self.task((words, &what), move |file, _| {
                 Box::new(move |path| {
-                    let exported = samples(&file.setup());
-                    write(
-                        exported.and_then(|sets| ExportedDecoder::of_run(&file, sets, decoder)),
-                        path,
-                    )
+                    let of_samples = || ExportedDecoder::of_run(&file, samples(&file.setup())?, decoder);
+                    let of_file = decoder.is_network().then(|| Ok(ExportedDecoder::from(&*file)));
+                    write(of_file.unwrap_or_else(of_samples), path)
                 })
             });
         };
