@@ -19,12 +19,12 @@ use crate::{
 };
 
 const SAVE: &str = "Checkpoint, resumable";
-const OPEN: &str = "Open files";
+const OPEN: &str = "Open checkpoint…";
 
 /// Types `path` into the form behind `button` and confirms.
 fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
     if button == OPEN {
-        driver.act(button);
+        driver.open_form(button);
     } else {
         driver.export(button);
     }
@@ -152,6 +152,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
         let (driver, setup) = (&mut opened.driver, &opened.setup);
         driver.click("▶ Train");
         driver.wait_for_epochs(5);
+        driver.open_menu();
         driver.choose_export(SAVE);
         assert!(!driver.is_enabled("Save…"), "a training is paused first");
         assert!(driver.says("A training under way cannot be saved"));

@@ -3,9 +3,7 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
-use super::{
-    DecouplerWindow, clipboard::ToCopy, files::ToWrite, modal::Modal, remembered::is_within_limits, save_form::Saving,
-};
+use super::{DecouplerWindow, files::ToWrite, modal::Modal, remembered::is_within_limits, save_form::Saving};
 use crate::window::{
     job::caught,
     preview,
@@ -92,8 +90,7 @@ impl DecouplerWindow {
                 }
             }
             Effect::Export(exporting) => self.modal = Some(Modal::Export(*exporting)),
-            Effect::Copy { text, notice } => self.copy_text(text, notice),
-            Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
+            Effect::Copy(to_copy, notice) => self.copy(to_copy, notice),
             Effect::KeepRun(file) => self.runs.ask(RunsRequest::Keep(file)),
             Effect::RenameRun(id, name) => self.runs.ask(RunsRequest::Rename(id, name)),
             Effect::PinRun(place, id) => self.runs.ask(RunsRequest::Pin(place, id)),
@@ -159,20 +156,15 @@ impl DecouplerWindow {
         theme::apply(&self.ctx, is_dark);
     }
 
-    /// Asks for a path in the window itself, and suggests the path typed last for the same file.
+    /// Asks for a path in the window itself.
     pub(super) fn type_path(&mut self, task: FileTask) {
-        let is_same = |typed: &&Saving| typed.task.is_same_file(&task);
-        let path = match self.typed.as_ref().filter(is_same) {
-            Some(typed) => typed.path.clone(),
-            None => task.suggested_path().display().to_string(),
-        };
+        let path = task.suggested_path().display().to_string();
         self.modal = Some(Modal::Path(Saving::new(task, path, None)));
     }
 
     /// Closes the form and carries out its task on the file at `path`; `asks` whether a file there may be replaced.
     pub(super) fn take_typed(&mut self, path: PathBuf, asks: bool) {
         if let Some(Modal::Path(typed)) = self.modal.take() {
-            self.typed = Some(typed.clone());
             self.answer(typed.task, path, asks);
         }
         self.ctx.request_repaint();

@@ -57,7 +57,6 @@ impl DecouplerWindow {
     fn report_written(&mut self, (ToWrite { task, path, asks }, written): (ToWrite, Written)) {
         let tried = match written {
             Written::Done(message) => {
-                self.typed = None;
                 return self.notices.add(Matter::File, Notice::Saved(message, path));
             }
             Written::Exists => Tried::Exists,
@@ -102,7 +101,6 @@ impl DecouplerWindow {
         });
         if start != Start::New {
             self.take_setup(&setup);
-            self.typed = None;
         }
         self.share_plan();
         self.shared.phase = match start {

@@ -1,6 +1,8 @@
 //! The one card over the window that must be answered or closed first: the list of all commands, the help, the form of a
 //! path, or the question before closing.
 
+use std::path::PathBuf;
+
 use eframe::egui::{
     Align, Button, Frame, Id, Key, Layout, Margin, Modal as EguiModal, Modifiers, Response, RichText, ScrollArea,
     TextEdit, Ui, WidgetInfo, accesskit::Role, vec2,
@@ -11,11 +13,11 @@ use super::{
     closing::{Closing, closing_ui},
     export_dialog::export_dialog_ui,
     help::{Help, Page, help_ui},
-    save_form::{self, Saving, save_form_ui},
+    save_form::{Saving, save_form_ui},
 };
 use crate::window::{
     glossary,
-    shared::{About, Command, Exporting, Offer},
+    shared::{About, Command, Effect, Exporting, Offer},
     theme::{Theme, space},
     widgets::dim_ui,
 };
@@ -43,6 +45,10 @@ pub(super) enum Reply {
     Do(Command),
     /// Explain this term.
     Define(&'static str),
+    /// Use this path, after asking about a file that exists there if true.
+    Path(PathBuf, bool),
+    /// Apply this.
+    Apply(Box<Effect>),
     /// Close the window, and keep the running training for the next start or not.
     Leave { keeps_training: bool },
 }
@@ -59,26 +65,20 @@ impl DecouplerWindow {
             Some(Modal::Palette(palette)) => palette_ui(ui, palette, offers),
             Some(Modal::Help(help)) => help_ui(ui, help, offers),
             Some(Modal::Closing(closing)) => closing_ui(ui, closing, &unfinished),
-            Some(Modal::Path(saving)) => match save_form_ui(ui, saving) {
-                Some(save_form::Reply::Path(path, asks)) => return self.take_typed(path, asks),
-                Some(save_form::Reply::Cancel) => Some(Reply::Close),
-                None => None,
-            },
+            Some(Modal::Path(saving)) => save_form_ui(ui, saving),
             Some(Modal::Export(exporting)) => {
                 let shown = self.views.get(self.shared.shown).shown(&self.shared);
-                match export_dialog_ui(ui, exporting, shown) {
-                    Some(effect) => {
-                        self.modal = None;
-                        effect.into_iter().for_each(|effect| self.apply(effect));
-                        None
-                    }
-                    None => None,
-                }
+                export_dialog_ui(ui, exporting, shown)
             }
         };
         match reply {
             None => return,
             Some(Reply::Close) => self.modal = None,
+            Some(Reply::Path(path, asks)) => self.take_typed(path, asks),
+            Some(Reply::Apply(effect)) => {
+                self.modal = None;
+                self.apply(*effect);
+            }
             Some(Reply::Do(command)) => (self.modal, self.picked) = (None, Some(command)),
             Some(Reply::Define(term)) => self.modal = Some(Modal::Help(Help::open(Page::Glossary, term))),
             Some(Reply::Leave { keeps_training }) => self.leave(keeps_training),

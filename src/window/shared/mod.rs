@@ -16,7 +16,8 @@ pub use super::training_worker::RunResult;
 pub use command::{About, Command, Offer, Offers};
 pub use error_table::error_table_ui;
 pub use export::{
-    ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, file_stem, saying_saved,
+    ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, ToCopy, file_stem,
+    saying_saved,
 };
 pub use look::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 pub use offers::{FileInUse, refuse_in_use};
