@@ -285,8 +285,8 @@ pub struct TargetCharts {
     pub lines: Vec<RegressionLine>,
     /// Errors of loading and unloading for each target that rises and falls.
     pub loops: Vec<Option<HysteresisLoop>>,
-    /// Error over the position, or the reason why there is none.
-    pub error_map: Result<Arc<HeatMap>, &'static str>,
+    /// Error over the position, if two targets are one.
+    pub error_map: Option<HeatMap>,
 }
 
 impl Positions {
@@ -342,21 +342,17 @@ impl RecordedTest {
             error_map: match &self.positions {
                 // Targets that have positions are not positions themselves.
                 Positions::None => error_map(&self.set, answers, &self.problem.targets),
-                _ => Err(NO_PAIR),
+                _ => None,
             },
         }
     }
 }
 
-const NO_PAIR: &str = "A map needs two targets that are positions: lengths in the same unit, or both without a unit.";
-
-fn error_map(set: &Dataset, answers: &Array2<f64>, targets: &[Channel]) -> Result<Arc<HeatMap>, &'static str> {
-    let pair = position_pair(targets).ok_or(NO_PAIR)?;
+fn error_map(set: &Dataset, answers: &Array2<f64>, targets: &[Channel]) -> Option<HeatMap> {
+    let pair = position_pair(targets)?;
     let [actual, answers] = [set.targets(), answers.view()].map(|values| values.select(Axis(1), &pair));
     let names = pair.map(|target| targets[target].name.as_str());
-    let map = position_error_map(actual.view(), answers.view(), names, targets[pair[0]].unit.as_deref());
-    map.map(Arc::new)
-        .ok_or("The positions of the test samples do not vary, so there is no map.")
+    position_error_map(actual.view(), answers.view(), names, targets[pair[0]].unit.as_deref())
 }
 
 /// Returns two targets that are coordinates in the same unit, for a map: lengths, or targets without units whose names are

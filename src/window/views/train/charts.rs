@@ -153,10 +153,10 @@ const ERROR_MAP: Chart = Chart {
     name: "Error map",
     is_offered: |shared| {
         let charts = shared.result().and_then(|result| result.charts.as_ref());
-        charts.is_some_and(|charts| charts.error_map.is_ok())
+        charts.is_some_and(|charts| charts.error_map.is_some())
     },
     draw: |view, shared| {
-        let map = target_charts(view, shared)?.error_map.as_ref().ok()?;
+        let map = target_charts(view, shared)?.error_map.as_ref()?;
         Some(HeatMap::clone(map).coloured(shared.look.colours).into())
     },
     ..BARE

@@ -35,7 +35,7 @@ pub fn configuration_ui(
     scrolled_ui(ui, "configuration", |ui| {
         ui.add_space(space(2));
         ui.add_enabled_ui(!shared.phase.is_busy(), |ui| {
-            source_choice_ui(ui, shared.source, effects)
+            source_choice_ui(ui, shared.source, effects);
         });
         ui.add_space(space(2));
         let mut fields = Fields::new(&mut settings);

@@ -21,8 +21,8 @@ use super::{
 use crate::window::{
     job::Wake,
     shared::{
-        Command, Effect, Holdings, Look, MIN_WIDTH_FOR_REPORT, Matter, Notice, Offers, Phase, RightCard, RunResult,
-        RunView, Shared, Shown, SourceKind, Status, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, Look, MIN_WIDTH_FOR_REPORT, Offers, Phase, RightCard, RunResult, RunView, Shared,
+        Shown, SourceKind, Status, Unfinished, View, run_buttons_ui,
     },
     test_view::{Drawing, RecordedTest},
     theme::space,
@@ -33,8 +33,7 @@ impl View for TrainView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
         self.decoders.follow(shared);
-        let failure = self.scrub.take_failure();
-        effects.extend(failure.map(|reason| Effect::Notify(Matter::Training, Notice::Failed(reason))));
+        self.scrub.follow(shared, effects);
     }
 
     fn holdings(&self, _shared: &Shared) -> Holdings {
@@ -227,7 +226,6 @@ impl TrainView {
 
     /// Draws what is displayed.
     fn follow(&mut self, shared: &Shared) {
-        self.scrub.follow(shared);
         let result = self.scrub.shown(shared);
         let target = shared.recorded_test().map_or(0, |test| self.target_of(test));
         self.snapshot = self.drawn.follow(shared, result, self.snapshot, target);
