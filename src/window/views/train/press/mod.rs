@@ -25,7 +25,6 @@ use crate::window::{
     shared::{RunResult, Shared},
     surface_view::SurfaceViewResponse,
     test_view::TestView,
-    views::train::drawn::Frames,
 };
 
 pub use section::{press_section_ui, readings_head_ui, readings_ui};
@@ -79,11 +78,6 @@ impl PressState {
     /// What is shown of the touch; `None` while the test set is displayed, or before the first answer.
     pub fn shown(&self) -> Option<&Shown> {
         self.answered.as_ref()?.1.as_ref().ok()
-    }
-
-    /// Surfaces of the touch.
-    pub fn frames(&self) -> Option<&Frames> {
-        self.shown().map(|shown| &shown.frames)
     }
 
     /// Goes back to the test set.
