@@ -96,7 +96,7 @@ fn a_given_memory_is_kept_by_the_choice() {
     assert!(driver.says("Chosen automatically while these fields are empty"));
     driver.enter("Lags", "3");
     driver.settle();
-    assert!(driver.says(", fixed"), "{:#?}", driver.texts());
+    assert!(driver.says("lags 3"), "{:#?}", driver.texts());
     driver.click("▶ Train");
     driver.wait_for_training();
     let run = driver.state().run.as_ref().unwrap();

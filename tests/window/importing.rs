@@ -469,7 +469,7 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
         driver.has("Training: 3") && driver.says("v is missing")
     });
     // The columns are read and the samples counted by different threads.
-    driver.wait("the missing cell", |driver| driver.has("Missing in v: 1"));
+    driver.wait("the missing cell", |driver| driver.has("v, missing: 1"));
 }
 
 #[test]

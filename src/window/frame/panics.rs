@@ -194,8 +194,9 @@ fn jobs_of_a_recording_can_be_started_again_after_a_panic() {
         assert!(view.take_files(std::slice::from_ref(&path), shared, &mut effects));
         driver.harness().step();
     };
-    panics(&mut driver, "opening", open);
-    panics(&mut driver, "import", open);
+    panics(&mut driver, "recording", open);
+    open(&mut driver);
+    driver.wait("the samples", |driver| driver.says("Test: "));
     driver.click_button("Identifiability");
     panics(&mut driver, "recording study", |driver| driver.act("Analyse readings"));
     driver.act("Analyse readings");

@@ -8,11 +8,10 @@ use std::{
 };
 
 use super::{
-    checking::Checking,
     files_section::FILES,
     import::{Import, file_name},
-    opening::{Files, Opened, Opening, Reopened, ToOpen},
-    options::Typed,
+    opening::{Opened, Reopened, open_files, reopen, write_sample},
+    reading::Reading,
 };
 use crate::window::{
     job::Wake,
@@ -24,8 +23,8 @@ use decoupler_core::{
     scene::RowModel,
 };
 use decoupler_files::{
-    export::{NetworkFile, RunSummary},
-    import::{Meaning, Plan, Setup},
+    export::RunSummary,
+    import::{Meaning, Plan, Setup, Watch},
 };
 
 /// Editor of the recording that is trained on: its files, the meaning of their columns, and the division of the samples.
@@ -39,10 +38,9 @@ pub struct RecordingEditor {
     pub(super) missing: Option<Box<Reopened>>,
     /// Names of files that have changed since the run with this import.
     pub(super) changed: Vec<String>,
-    pub(super) opening: Opening,
-    pub(super) checking: Checking,
-    /// Texts in the fields of options that are not in the plan yet, by the names of the options.
-    pub(super) typed: BTreeMap<&'static str, Typed>,
+    pub(super) reading: Reading,
+    /// Texts in the fields of options that are not in the plan, by the names of the options, with the reason if they were refused.
+    pub(super) typed: BTreeMap<&'static str, (String, Option<String>)>,
     /// True if the user is viewing the columns while there is a run to show.
     pub(super) shows_columns: bool,
     /// The file asked for last, and where its path arrives.
@@ -77,8 +75,7 @@ impl RecordingEditor {
             import: None,
             missing: None,
             changed: Vec::new(),
-            opening: Opening::new(Arc::clone(wake)),
-            checking: Checking::new(Arc::clone(wake)),
+            reading: Reading::new(Arc::clone(wake)),
             typed: BTreeMap::new(),
             shows_columns: false,
             asked: None,
@@ -111,8 +108,8 @@ impl RecordingEditor {
         if let (Some(reopened), [path]) = (&self.missing, &paths[..]) {
             let mut missing = reopened.missing.iter();
             if let Some(missing) = missing.find(|missing| missing.file_name() == path.file_name()) {
-                let found = Some((missing.clone(), path.clone()));
-                return self.opening.start(ToOpen::Plan(reopened.clone(), found));
+                let (reopened, missing) = (reopened.clone(), missing.clone());
+                return self.take_found(*reopened, missing, path.clone());
             }
         }
         let open = self.import.as_ref().map(Import::paths).unwrap_or_default();
@@ -125,10 +122,10 @@ impl RecordingEditor {
         let is_open = self.plan().is_ok_and(|open| *open == *plan);
         let missing = self.missing.as_ref().map(|missing| &missing.recorded.plan);
         if !is_open && missing != Some(plan) {
-            let reopened = Box::new(Reopened::from(plan.clone()));
-            self.opening.start(ToOpen::Plan(reopened, None));
-        } else if self.opening.is_reopening {
-            self.opening.cancel();
+            let (reopened, name) = (Reopened::from(plan.clone()), file_name(&plan.import.data));
+            self.reading.open(name, true, |watch| reopen(reopened, watch));
+        } else if self.reading.is_reopening() {
+            self.reading.cancel();
         }
     }
 
@@ -140,7 +137,7 @@ impl RecordingEditor {
 
     /// Returns true if no file is open, missing or being opened.
     pub fn is_empty(&self) -> bool {
-        self.import.is_none() && self.missing.is_none() && self.opening.under_way.is_none()
+        self.import.is_none() && self.missing.is_none() && !self.reading.is_opening()
     }
 
     /// Closes a recording; without the last one there is no import.
@@ -167,7 +164,7 @@ impl RecordingEditor {
 
     /// Closes all files.
     pub(super) fn close_all(&mut self) {
-        self.opening.cancel();
+        self.reading.cancel();
         (self.import, self.missing) = (None, None);
         self.changed.clear();
         self.typed.clear();
@@ -187,21 +184,37 @@ impl RecordingEditor {
     }
 
     fn open_files(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
-        let older = Box::new(self.import.clone().unwrap_or_default());
+        let older = self.import.clone().unwrap_or_default();
         let used = older.used(self.variable.as_ref().map(|(file, name, _)| (*file, name.as_str())));
-        self.opening.start(ToOpen::Files(Files {
-            new,
-            open,
-            older,
-            used,
-            sample: None,
-        }));
+        let names = if new.is_empty() { &open } else { &new };
+        let names = Vec::from_iter(names.iter().map(|path| file_name(path))).join(", ");
+        self.reading
+            .open(names, false, move |watch| open_files(new, open, (&older, &used), watch));
+    }
+
+    /// Opens the sample recording, which is written into `folder`.
+    pub(super) fn open_sample(&mut self, folder: PathBuf) {
+        let open = move |watch: Watch<'_>| {
+            let new = vec![write_sample(&folder)?];
+            open_files(new, Vec::new(), (&Import::default(), &[]), watch)
+        };
+        self.reading.open("sample recording".to_owned(), false, open);
+    }
+
+    /// Opens the file at `found` in the place of a missing one.
+    fn take_found(&mut self, mut reopened: Reopened, missing: PathBuf, found: PathBuf) {
+        let name = file_name(&found);
+        let open = move |watch: Watch<'_>| {
+            reopened.relocate(&missing, &found)?;
+            reopen(reopened, watch)
+        };
+        self.reading.open(name, true, open);
     }
 
     /// Takes events of the threads and paths chosen, and reports the plan if it has changed.
     pub fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.take_chosen(shared.phase.is_busy(), effects);
-        if let Some(opened) = self.opening.next_opened() {
+        if let Some(opened) = self.reading.next_opened() {
             match opened {
                 Ok(opened) => {
                     effects.push(Effect::Settle(Matter::Recording));
@@ -223,14 +236,14 @@ impl RecordingEditor {
             if plan.is_ok() {
                 self.follow_row_wires(settings, effects);
             }
-            self.checking.follow(plan.clone().ok(), settings.seed);
+            self.reading.check(plan.clone().ok(), settings.seed);
         }
         let is_reported = match (&plan, &shared.recording.plan) {
             (Ok(plan), Ok(reported)) => Arc::ptr_eq(plan, reported),
             (Err(reason), Err(reported)) => reason == reported,
             _ => false,
         };
-        if !self.opening.is_reopening && !is_reported {
+        if !self.reading.is_reopening() && !is_reported {
             effects.push(Effect::Import(plan));
         }
     }
@@ -244,8 +257,8 @@ impl RecordingEditor {
         match (of.clone(), &mut self.import, &self.missing) {
             (Use::Recording, ..) => self.open(paths),
             (Use::Missing(missing), _, Some(reopened)) => {
-                self.opening
-                    .start(ToOpen::Plan(reopened.clone(), Some((missing, path))));
+                let reopened = Reopened::clone(reopened);
+                self.take_found(reopened, missing, path);
             }
             (Use::Test, Some(import), _) => {
                 let refused = paths.into_iter().filter_map(|path| import.add_test_file(path).err());
@@ -346,7 +359,7 @@ impl RecordingEditor {
     /// Sets the share held out for validation when another method needs another share, unless the user has set it.
     fn follow_method(&mut self, settings: &RunSettings) {
         let fraction = settings.validation_fraction();
-        let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.opening.is_reopening;
+        let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.reading.is_reopening();
         if let (true, Some(import)) = (is_new, &mut self.import) {
             import.edit().division.validation_fraction = Some(fraction);
         }
@@ -355,7 +368,7 @@ impl RecordingEditor {
 
     /// Selects one network for all rows if no column contains the row numbers.
     fn follow_row_wires(&self, settings: &RunSettings, effects: &mut Vec<Effect>) {
-        if settings.source.row_model() == RowModel::Each && !self.has_row_wires() && !self.opening.is_reopening {
+        if settings.source.row_model() == RowModel::Each && !self.has_row_wires() && !self.reading.is_reopening() {
             effects.push(Effect::ConfigureRecording(Box::new(RunSettings {
                 source: Source::Measured { rows: RowModel::Shared },
                 ..*settings
@@ -373,7 +386,7 @@ impl RecordingEditor {
         }
         match (&self.import, self.obstacle()) {
             (None, _) => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
-            (Some(_), _) if self.opening.under_way.is_some() => Err("Files are being opened.".to_owned()),
+            (Some(_), _) if self.reading.is_opening() => Err("Files are being opened.".to_owned()),
             (Some(_), Some(obstacle)) => Err(obstacle),
             (Some(import), None) => Ok(Arc::clone(&import.plan)),
         }
@@ -381,7 +394,7 @@ impl RecordingEditor {
 
     /// Returns the reason why there is nothing to train on yet: a text that was refused, or what the plan lacks.
     pub(super) fn obstacle(&self) -> Option<String> {
-        let refused = self.typed.values().find_map(|typed| typed.refusal.clone());
+        let refused = self.typed.values().find_map(|(_, refusal)| refusal.clone());
         refused.or_else(|| self.import.as_ref()?.obstacle())
     }
 
@@ -394,7 +407,7 @@ impl RecordingEditor {
 
     /// Returns the size of a training with one network, once the import is checked.
     pub fn training_size(&self, settings: &RunSettings) -> Option<TrainingSize> {
-        let checked = self.checking.checked.as_ref()?.as_ref().ok()?;
+        let checked = self.reading.checked()?;
         (settings.source.row_model() == RowModel::Shared).then_some(checked.size)
     }
 

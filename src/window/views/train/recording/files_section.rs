@@ -9,7 +9,7 @@ use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
 use super::{
     editor::{RecordingEditor, Use},
     import::{Import, file_name},
-    opening::{Files, ToOpen},
+    reading::State,
 };
 use crate::window::{
     shared::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Shared, file_stem, sentence},
@@ -60,8 +60,8 @@ impl RecordingEditor {
             note_ui(ui, &format!("{name} has changed since the run was saved."));
         }
         self.samples_line_ui(ui);
-        if let Some((name, progress)) = &self.opening.under_way {
-            dim_ui(ui, &format!("Reading {name}…"));
+        if let State::Opening { names, progress, .. } = &self.reading.state {
+            dim_ui(ui, &format!("Reading {names}…"));
             let share = progress.and_then(|progress| Some(progress.bytes as f32 / progress.of?.max(1) as f32));
             if let Some(share) = share {
                 progress_bar_ui(ui, "Reading", share, &format!("{:.0} %", 100.0 * share));
@@ -75,10 +75,7 @@ impl RecordingEditor {
             if button.on_hover_text(hint).clicked() {
                 let data_folder = shared.runs.path.as_ref().and_then(|runs| runs.parent());
                 let folder = data_folder.map_or_else(std::env::temp_dir, PathBuf::from);
-                self.opening.start(ToOpen::Files(Files {
-                    sample: Some(folder.join("samples")),
-                    ..Files::default()
-                }));
+                self.open_sample(folder.join("samples"));
             }
         }
     }
@@ -117,24 +114,18 @@ impl RecordingEditor {
         if self.import.is_none() {
             return;
         }
-        if let Some(reason) = self.obstacle() {
-            note_ui(ui, &sentence(&reason));
-            return;
-        }
-        let channels = self.channels().map(|(inputs, targets)| {
-            let inputs = counted(inputs, "input");
-            format!("{inputs}, {}", counted(targets, "target"))
-        });
-        let samples = match &self.checking.checked {
-            Some(Ok(checked)) => counted(checked.samples.iter().sum::<usize>(), "sample"),
-            Some(Err(reason)) => {
-                note_ui(ui, &sentence(reason));
-                return;
+        let (inputs, targets) = self.channels().unwrap_or_default();
+        let channels = format!("{}, {}", counted(inputs, "input"), counted(targets, "target"));
+        match (self.obstacle(), &self.reading.state) {
+            (Some(reason), _) => drop(note_ui(ui, &sentence(&reason))),
+            (None, State::Checked(Err(reason))) => drop(note_ui(ui, &sentence(reason))),
+            (None, State::Checked(Ok(checked))) => {
+                let samples = counted(checked.samples.iter().sum::<usize>(), "sample");
+                dim_ui(ui, &format!("{channels}, {samples}"));
             }
-            None if self.checking.is_under_way() => "checking the import…".to_owned(),
-            None => return,
-        };
-        dim_ui(ui, &format!("{}, {samples}", channels.unwrap_or_default()));
+            (None, State::Checking) => drop(dim_ui(ui, &format!("{channels}, checking the import…"))),
+            (None, State::Idle | State::Opening { .. }) => {}
+        }
     }
 
     fn buttons_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
@@ -147,9 +138,9 @@ impl RecordingEditor {
             if ui.add(ghost_button(text)).on_hover_text(FILES.description).clicked() {
                 effects.push(Effect::ChooseFile(self.open_task()));
             }
-            if self.opening.under_way.is_some() {
+            if self.reading.is_opening() {
                 if ui.add(ghost_button("Cancel")).clicked() {
-                    self.opening.cancel();
+                    self.reading.cancel();
                 }
             } else if !self.is_empty() {
                 let clear = ui.add(ghost_button("Clear"));

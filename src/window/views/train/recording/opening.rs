@@ -11,8 +11,8 @@ use decoupler_core::dataset::Simulation;
 use decoupler_files::{
     export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, atomic_write},
     import::{
-        FileChecksum, FileSet, Format, Joined, Plan, Progress, Recorded, Watch, file_crc32, holds_positions,
-        suggested_plan, suggested_plan_in_order,
+        FileChecksum, FileSet, Format, Joined, Plan, Recorded, Watch, file_crc32, holds_positions, suggested_plan,
+        suggested_plan_in_order,
     },
 };
 
@@ -20,31 +20,6 @@ use super::{
     checking::in_window,
     import::{Import, file_name},
 };
-use crate::window::job::{Background, JobError, Report, Wake};
-
-/// Files to be opened.
-#[derive(Debug)]
-pub(super) enum ToOpen {
-    /// Recordings, or a file of this program.
-    Files(Files),
-    /// Files of a plan, of which the missing one at the first path was found at the second.
-    Plan(Box<Reopened>, Option<(PathBuf, PathBuf)>),
-}
-
-/// Recordings to be opened.
-#[derive(Debug, Default)]
-pub(super) struct Files {
-    /// Files to be opened: one may be a recipe, a network or a checkpoint.
-    pub(super) new: Vec<PathBuf>,
-    /// Folder into which the sample recording is written, to be opened too.
-    pub(super) sample: Option<PathBuf>,
-    /// Files that are open, to which recordings are added.
-    pub(super) open: Vec<PathBuf>,
-    /// The import with them.
-    pub(super) older: Box<Import>,
-    /// Full names of columns and variables whose rows are the samples.
-    pub(super) used: Vec<String>,
-}
 
 /// Contents of a file that was opened.
 #[derive(Debug)]
@@ -63,93 +38,15 @@ pub(super) enum Opened {
     Checkpoint(PathBuf),
 }
 
-/// Event of files being opened.
-#[derive(Debug)]
-enum OpeningEvent {
-    Reading(Progress),
-    Opened(Result<Opened, String>),
-}
-
-/// Files under way.
-#[derive(Debug)]
-pub(super) struct Opening {
-    job: Background<OpeningEvent>,
-    /// Names of the files under way, and the progress of reading them.
-    pub(super) under_way: Option<(String, Option<Progress>)>,
-    /// True while the files of a plan are being opened.
-    pub(super) is_reopening: bool,
-}
-
-impl Opening {
-    pub(super) fn new(wake: Wake) -> Self {
-        Self {
-            job: Background::prompt("opening", wake),
-            under_way: None,
-            is_reopening: false,
-        }
-    }
-
-    /// Opens files; those still being opened are abandoned.
-    pub(super) fn start(&mut self, to_open: ToOpen) {
-        let paths = match &to_open {
-            ToOpen::Files(files) if files.new.is_empty() => &files.open[..],
-            ToOpen::Files(files) => &files.new,
-            ToOpen::Plan(reopened, _) => std::slice::from_ref(&reopened.recorded.plan.import.data),
-        };
-        let names = Vec::from_iter(paths.iter().map(|path| file_name(path))).join(", ");
-        self.is_reopening = matches!(to_open, ToOpen::Plan(..));
-        self.under_way = Some((names, None));
-        self.job.start(
-            move |report| open(to_open, report),
-            |opened: Result<_, JobError>| OpeningEvent::Opened(opened.unwrap_or_else(|error| Err(error.to_string()))),
-        );
-    }
-
-    /// Cancels opening files.
-    pub(super) fn cancel(&mut self) {
-        self.job.abandon();
-        (self.under_way, self.is_reopening) = (None, false);
-    }
-
-    /// Returns the contents of the files once they are read.
-    pub(super) fn next_opened(&mut self) -> Option<Result<Opened, String>> {
-        loop {
-            match (self.job.next_event()?, &mut self.under_way) {
-                (OpeningEvent::Reading(progress), Some((_, latest))) => *latest = Some(progress),
-                (OpeningEvent::Reading(_), None) => {}
-                (OpeningEvent::Opened(opened), _) => {
-                    (self.under_way, self.is_reopening) = (None, false);
-                    return Some(opened);
-                }
-            }
-        }
-    }
-}
-
-fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String> {
-    let mut watch = |progress| {
-        report.progress(OpeningEvent::Reading(progress), |_, _| ());
-        if report.is_cancelled() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    };
-    match to_open {
-        ToOpen::Files(files) => open_files(files, &mut watch),
-        ToOpen::Plan(mut reopened, found) => {
-            if let Some((missing, found)) = found {
-                reopened.relocate(&missing, &found)?;
-            }
-            reopen(*reopened, &mut watch)
-        }
-    }
-}
-
-fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
-    let older = files.older;
-    let mut new = with_tables_of_folders(files.new)?;
-    new.extend(files.sample.map(|folder| write_sample(&folder)).transpose()?);
+/// Opens the files at `new`, of which one may be a recipe, a network or a checkpoint. Recordings are added to those at `open`,
+/// which are those of the `older` import; `used` are full names of columns and variables whose rows are the samples.
+pub(super) fn open_files(
+    new: Vec<PathBuf>,
+    open: Vec<PathBuf>,
+    (older, used): (&Import, &[String]),
+    watch: Watch<'_>,
+) -> Result<Opened, String> {
+    let new = with_tables_of_folders(new)?;
     let document = new.iter().find_map(|path| Some((path, DocumentKind::of_file(path)?)));
     match (document, new.len()) {
         (None, _) => {}
@@ -166,7 +63,7 @@ fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
         ));
     }
     let (positions, recordings): (Vec<PathBuf>, Vec<PathBuf>) = new.into_iter().partition(|path| holds_positions(path));
-    let has_recording = !(files.open.is_empty() && recordings.is_empty());
+    let has_recording = !(open.is_empty() && recordings.is_empty());
     if let Some(path) = positions.first().filter(|_| positions.len() > 1 || !has_recording) {
         let path = path.display();
         return Err(format!(
@@ -176,7 +73,7 @@ fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
     // The file with the readings is guessed only if the set of files changes.
     let has_new = !recordings.is_empty();
     let appended = &older.plan.import.append;
-    let mut paths = files.open;
+    let mut paths = open;
     let further = appended.iter().flat_map(FileSet::files).filter(|_| has_new);
     for path in further.chain(&recordings) {
         if !paths.contains(path) {
@@ -188,7 +85,7 @@ fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
     let mut inspect = |plan: &Plan| {
         let mut import = older.merged(plan.clone()).import;
         import.time = import.time.or_else(|| time.clone());
-        let inspected = import.inspect(Path::new(""), &files.used, watch);
+        let inspected = import.inspect(Path::new(""), used, watch);
         inspected.map_err(|error| in_window(&error))
     };
     let mut plan = Plan::default();
@@ -270,7 +167,7 @@ fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Op
 }
 
 /// Opens the files of a plan again, if all are there, and notes which have changed.
-fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
+pub(super) fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
     let missing = reopened.recorded.missing();
     reopened.missing = missing.into_iter().map(PathBuf::from).collect();
     if !reopened.missing.is_empty() {
@@ -343,7 +240,7 @@ impl Reopened {
     ///
     /// # Errors
     /// If a file cannot be read.
-    fn relocate(&mut self, missing: &Path, found: &Path) -> Result<(), String> {
+    pub(super) fn relocate(&mut self, missing: &Path, found: &Path) -> Result<(), String> {
         self.recorded = self.recorded.relocated(missing, found);
         let folder = found.parent().unwrap_or(Path::new(""));
         for file in self.recorded.files.clone() {
@@ -375,7 +272,7 @@ const TEXT: &str = include_str!("../../../../../assets/samples/soft_skin.csv");
 ///
 /// # Errors
 /// If it cannot be written.
-fn write_sample(folder: &Path) -> Result<PathBuf, String> {
+pub(super) fn write_sample(folder: &Path) -> Result<PathBuf, String> {
     let path = folder.join(NAME);
     let written = fs::create_dir_all(folder).map_err(|error| error.to_string());
     let write = |()| atomic_write(&path, |file| file.write_all(TEXT.as_bytes())).map_err(|error| error.to_string());

@@ -2,7 +2,7 @@
 
 use eframe::egui::{Align, Layout, Sense, Ui};
 
-use super::{checking::Checked, editor::RecordingEditor};
+use super::{checking::Checked, editor::RecordingEditor, reading::State};
 use crate::window::{
     shared::{Effect, Shared, sentence},
     theme::space,
@@ -50,15 +50,11 @@ impl RecordingEditor {
 
     fn samples_ui(&self, ui: &mut Ui) {
         section_heading_ui(ui, "Samples");
-        match &self.checking.checked {
-            Some(Ok(checked)) => checked_ui(ui, checked),
-            Some(Err(reason)) => {
-                dim_ui(ui, &format!("There are no samples: {}", sentence(reason)));
-            }
-            None if self.checking.is_under_way() => {
-                dim_ui(ui, "Checking the import…");
-            }
-            None => {}
+        match &self.reading.state {
+            State::Checked(Ok(checked)) => checked_ui(ui, checked),
+            State::Checked(Err(reason)) => drop(dim_ui(ui, &format!("There are no samples: {}", sentence(reason)))),
+            State::Checking => drop(dim_ui(ui, "Checking the import…")),
+            State::Idle | State::Opening { .. } => {}
         }
     }
 }
