@@ -131,7 +131,7 @@ impl RecordingEditor {
 
     /// Checks the recordings of the checkpoint at `path`, which could not be resumed: they may be missing.
     pub fn look_for_recordings(&mut self, path: PathBuf) {
-        self.refused = Some(path.clone());
+        self.refused = Some(absolute(&path));
         self.open(vec![path]);
     }
 
@@ -143,12 +143,12 @@ impl RecordingEditor {
     /// Closes a recording; without the last one there is no import.
     pub(super) fn close(&mut self, number: usize) {
         let Some(import) = &mut self.import else { return };
-        let plan = import.edit();
-        if number == 0 && !plan.import.append.is_empty() {
+        if number == 0 && !import.plan.import.append.is_empty() {
             // The next one takes its place, with the files joined to it.
-            let next = plan.import.append.remove(0);
-            plan.import.data = next.data;
-            for (joined, file) in plan.import.join.iter_mut().zip(next.join) {
+            let recipe = &mut import.edit().import;
+            let next = recipe.append.remove(0);
+            recipe.data = next.data;
+            for (joined, file) in recipe.join.iter_mut().zip(next.join) {
                 joined.file = file;
             }
             return self.read_again();

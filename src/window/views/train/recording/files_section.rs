@@ -36,25 +36,16 @@ pub(super) const FILES: FileWords = FileWords {
     ],
 };
 
-/// An open file by its use.
-enum OpenFile {
-    /// A recording by its number: the first, or one that is joined to it.
-    Recording(usize),
-    /// A file whose rows follow those of the first, by its number.
-    Appended(usize),
-    /// A file for the test, by the number of the recording that it replaces.
-    Test(usize),
-    /// Positions of targets.
-    Positions,
-}
+/// Closes an open file by its number among the files of the same use.
+type Close = fn(&mut RecordingEditor, usize);
 
 impl RecordingEditor {
     /// Shows the files of the recording, and opens and closes them.
     pub fn files_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         section_heading_ui(ui, "Files");
         self.missing_ui(ui, effects);
-        if let Some(file) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
-            self.close_file(file);
+        if let Some((close, number)) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
+            close(self, number);
         }
         for name in &self.changed {
             note_ui(ui, &format!("{name} has changed since the run was saved."));
@@ -96,16 +87,6 @@ impl RecordingEditor {
         }
         if is_training {
             dim_ui(ui, "The training is resumed once its recording is found.");
-        }
-    }
-
-    fn close_file(&mut self, file: OpenFile) {
-        match (file, &mut self.import) {
-            (OpenFile::Recording(number), _) => self.close(number),
-            (OpenFile::Appended(number), Some(import)) => import.close_appended(number),
-            (OpenFile::Test(number), Some(import)) => import.set_test_file(number, PathBuf::new()),
-            (OpenFile::Positions, Some(import)) => import.edit().import.positions = None,
-            (_, None) => {}
         }
     }
 
@@ -165,38 +146,48 @@ impl RecordingEditor {
 }
 
 /// Lists the open files. Returns the one to be closed.
-fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<OpenFile> {
+fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<(Close, usize)> {
     let recipe = &import.plan.import;
-    let recordings = import.paths().into_iter().enumerate().map(|(number, path)| {
+    let mut files: Vec<(Close, usize, PathBuf, String)> = Vec::new();
+    for (number, path) in import.paths().into_iter().enumerate() {
         let what = if number == 0 { "" } else { ", joined" };
-        (OpenFile::Recording(number), path, what.to_owned())
-    });
-    let appended = recipe.append.iter().enumerate();
-    let appended =
-        appended.map(|(number, set)| (OpenFile::Appended(number), set.data.clone(), ", appended".to_owned()));
-    let tests = import.tests().into_iter().enumerate();
-    let tests = tests
-        .filter(|(_, (_, test))| !test.as_os_str().is_empty())
-        .map(|(number, (recording, test))| {
-            let of = format!(", for the test of {}", file_name(&recording));
-            let what = if import.files.len() > 1 {
-                of
-            } else {
-                ", for the test".to_owned()
-            };
-            (OpenFile::Test(number), test, what)
-        });
-    let positions = recipe.positions.iter();
-    let positions = positions.map(|path| (OpenFile::Positions, path.clone(), ", positions".to_owned()));
+        files.push((RecordingEditor::close, number, path, what.to_owned()));
+    }
+    for (number, set) in recipe.append.iter().enumerate() {
+        let close: Close = |editor, number| {
+            editor
+                .import
+                .iter_mut()
+                .for_each(|import| import.close_appended(number))
+        };
+        files.push((close, number, set.data.clone(), ", appended".to_owned()));
+    }
+    for (number, (recording, test)) in import.tests().into_iter().enumerate() {
+        let of = format!(" of {}", file_name(&recording));
+        let what = format!(", for the test{}", if import.files.len() > 1 { &of } else { "" });
+        let close: Close = |editor, number| {
+            let import = editor.import.iter_mut();
+            import.for_each(|import| import.set_test_file(number, PathBuf::new()));
+        };
+        files.push((close, number, test, what));
+    }
+    if let Some(path) = &recipe.positions {
+        let close: Close = |editor, _| {
+            let import = editor.import.iter_mut();
+            import.for_each(|import| import.edit().import.positions = None);
+        };
+        files.push((close, 0, path.clone(), ", positions".to_owned()));
+    }
+    files.retain(|(_, _, path, _)| !path.as_os_str().is_empty());
     let mut closed = None;
-    for (file, path, what) in recordings.chain(appended).chain(tests).chain(positions) {
+    for (close_file, number, path, what) in files {
         let name = file_name(&path);
         ui.horizontal(|ui| {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let close = ui.small_button("×");
                 close.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Close {name}")));
                 if close.on_hover_text("Closes this file.").clicked() {
-                    closed = Some(file);
+                    closed = Some((close_file, number));
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     let text = format!("{name}{what}");
