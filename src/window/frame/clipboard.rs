@@ -1,6 +1,6 @@
 //! The clipboard, which reports whether copying succeeded.
 //!
-//! Text and pictures are copied in the background; a context menu copies values, pictures and tables.
+//! Text and pictures are copied in the background.
 
 use std::{
     env, fmt,
@@ -8,14 +8,12 @@ use std::{
 };
 
 use decoupler_files::figure::Figure;
-use eframe::egui::{ColorImage, Id, Response, ScrollArea, Ui};
+use eframe::egui::ColorImage;
 
 use super::{DecouplerWindow, Desktop};
 use crate::window::{
     job::{Background, JobError, Wake},
-    shared::{Effect, Export, ExportGroup, Matter, Notice},
-    theme::space,
-    widgets::{dim_ui, take_claim, take_value_under},
+    shared::{Matter, Notice},
 };
 
 /// Content for the clipboard.
@@ -206,58 +204,6 @@ impl DecouplerWindow {
             None => {}
         }
         self.notices.add(Matter::Clipboard, notice);
-    }
-}
-
-/// Context menu of a part of the window: copies the value under the pointer, or a picture or table of the current view.
-pub(super) fn copy_menu_ui<'a>(part: &Response, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
-    let id = Id::unique("value to copy");
-    let is_asked = part.container_secondary_clicked();
-    // A field inside the part may have a menu of its own.
-    if is_asked && take_claim(&part.ctx) {
-        return;
-    }
-    if is_asked {
-        let value = take_value_under(&part.ctx);
-        part.ctx.data_mut(|data| data.insert_temp(id, value));
-    }
-    part.container_context_menu(|ui| menu_ui(ui, id, exports(), effects));
-}
-
-fn menu_ui(ui: &mut Ui, id: Id, exports: Vec<Export<'_>>, effects: &mut Vec<Effect>) {
-    ui.set_min_width(space(60));
-    let mut is_empty = true;
-    if let Some(value) = ui.data(|data| data.get_temp::<Option<String>>(id)).flatten() {
-        is_empty = false;
-        let shown = value.lines().next().unwrap_or_default();
-        if ui.button(format!("Copy “{shown}”")).clicked() {
-            let notice = format!("Copied {shown}");
-            effects.push(Effect::Copy { text: value, notice });
-            ui.close();
-        }
-        ui.separator();
-    }
-    ScrollArea::vertical().max_height(space(100)).show(ui, |ui| {
-        for export in exports {
-            let is_meant = export.is_copy() || export.group == ExportGroup::Figures;
-            let label = export.label();
-            let Some(ask) = export.ask.ok().filter(|_| is_meant) else {
-                continue;
-            };
-            is_empty = false;
-            let text = if label.starts_with("Copy") {
-                label
-            } else {
-                format!("{label}…")
-            };
-            if ui.button(text).on_hover_text(export.description).clicked() {
-                effects.push(ask());
-                ui.close();
-            }
-        }
-    });
-    if is_empty {
-        dim_ui(ui, "There is nothing to copy here yet.");
     }
 }
 

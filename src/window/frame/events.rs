@@ -1,13 +1,15 @@
 use super::{
     DecouplerWindow,
     applying::{have_same_sets, have_same_test_set, is_of_test_set},
-    files::Answer,
+    files::{Answer, ToWrite, Written},
+    modal::Modal,
+    save_form::{Saving, Tried},
 };
 use crate::window::{
     job::JobError,
     preview::PreviewEvent,
-    shared::{Matter, Notice, Phase, Preview, RunView},
-    training_worker::{Began, Event},
+    shared::{Matter, Notice, Phase, Preview, RunView, ViewKind},
+    training_worker::{Began, Event, Start},
 };
 use decoupler_core::evaluation::RunSettings;
 
@@ -29,17 +31,17 @@ impl DecouplerWindow {
         }
         while let Some((task, answer)) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(path) => self.answer(task, path),
+                Answer::Chosen(path) => self.answer(task, path, false),
                 Answer::NoDialog => self.type_path(task),
                 Answer::Cancelled => {}
             }
         }
-        self.take_path_checks();
         let mut effects = Vec::new();
         let mut working = Vec::new();
-        for view in self.views.all() {
+        for kind in ViewKind::ALL {
+            let view = self.views.get(kind);
             view.take_events(&self.shared, &mut effects);
-            working.extend(view.is_working().then(|| view.name()));
+            working.extend(view.holdings(&self.shared).is_computing.then_some(kind));
         }
         self.shared.working = working;
         self.apply_all(effects);
@@ -53,19 +55,21 @@ impl DecouplerWindow {
         self.request_preview();
     }
 
-    fn report_written(&mut self, written: Result<String, String>) {
-        let notice = match written {
-            Ok(message) => {
+    fn report_written(&mut self, (ToWrite { task, path, asks }, written): (ToWrite, Written)) {
+        let tried = match written {
+            Written::Done(message) => {
                 self.typed = None;
-                Notice::Done(message)
+                return self.notices.add(Matter::File, Notice::Saved(message, path));
             }
-            Err(reason) => {
+            Written::Exists => Tried::Exists,
+            Written::InUse(reason) if asks => Tried::Refused(reason),
+            Written::InUse(reason) | Written::Failed(reason) => {
                 // The user must see this.
-                self.closing = None;
-                Notice::Failed(reason)
+                self.modal.take_if(|modal| matches!(modal, Modal::Closing(_)));
+                return self.notices.fail(Matter::File, reason);
             }
         };
-        self.notices.add(Matter::File, notice);
+        self.modal = Some(Modal::Path(Saving::new(task, path.display().to_string(), Some(tried))));
     }
 
     pub(super) fn take_preview(&mut self, event: PreviewEvent) {
@@ -96,18 +100,31 @@ impl DecouplerWindow {
         }
     }
 
-    /// Shows a training restored from a checkpoint. If it has ended, its next event says so.
-    fn take_opened(&mut self, began: Began, phase: Phase) {
+    /// Shows a training that has begun. If one from a checkpoint has ended, its next event says so.
+    fn take_begun(&mut self, began: Began, start: Start) {
         let setup = began.setup.clone();
         self.shared.preview = None;
         self.shared.run = Some(RunView {
             // The checkpoint of one that was cut short is removed when the window closes.
-            is_saved: phase == Phase::Paused,
+            is_saved: start == Start::Paused,
             ..RunView::new(began)
         });
-        self.take_setup(&setup);
-        self.typed = None;
-        self.shared.phase = phase;
+        if start != Start::New {
+            self.take_setup(&setup);
+            self.typed = None;
+        }
+        self.share_plan();
+        self.shared.phase = match start {
+            Start::Paused => Phase::Paused,
+            Start::New | Start::Resumed => Phase::Training,
+        };
+    }
+
+    /// Shares the plan on the left with the training, if they have the same.
+    pub(super) fn share_plan(&mut self) {
+        if let Some(run) = &mut self.shared.run {
+            run.share_plan(&self.shared.recording);
+        }
     }
 
     fn take_event(&mut self, event: Event) {
@@ -119,15 +136,18 @@ impl DecouplerWindow {
             shared.choosing = None;
         }
         match event {
-            Event::Began(Ok(began)) => {
-                shared.preview = None;
-                shared.run = Some(RunView::new(*began));
-                shared.phase = Phase::Training;
+            Event::Began(_, start, Ok(began)) => self.take_begun(*began, start),
+            Event::Began(_, start, Err(reason)) => {
+                let matter = if start == Start::New {
+                    Matter::Settings
+                } else {
+                    Matter::Training
+                };
+                self.refuse(matter, reason);
+                if let Some(path) = self.opened.clone() {
+                    self.views.look_for_recordings(path);
+                }
             }
-            Event::Began(Err(error)) => self.refuse(Matter::Settings, error.to_string()),
-            Event::Opened(Ok(began)) => self.take_opened(*began, Phase::Paused),
-            Event::Resumed(Ok(began)) => self.take_opened(*began, Phase::Training),
-            Event::Resumed(Err(reason)) => self.refuse(Matter::Training, reason),
             Event::Left(question) => {
                 self.notices.settle(Matter::CutShort);
                 if let Some(question) = question {
@@ -137,12 +157,6 @@ impl DecouplerWindow {
             Event::Unkept(reason) => {
                 let text = format!("A running training will be lost if the program ends: {reason}");
                 self.notices.fail(Matter::Memory, text);
-            }
-            Event::Opened(Err(reason)) => {
-                self.refuse(Matter::Training, reason);
-                if let Some(path) = self.opened.clone() {
-                    self.views.look_for_recordings(path);
-                }
             }
             Event::Continued(Ok(settings)) => {
                 // Settings that were chosen were not asked for.
@@ -191,8 +205,6 @@ impl DecouplerWindow {
                 let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");
                 self.notices.fail(Matter::Training, text);
             }
-            // The worker does not pass these on.
-            Event::Abandoned => {}
         }
         if self.worker.is_preparing() {
             // The event belongs to the previous training.

@@ -12,7 +12,7 @@ use super::{
     reading::State,
 };
 use crate::window::{
-    shared::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Shared, file_stem, sentence},
+    shared::{Effect, FileTask, FileWords, Shared, file_stem, sentence},
     widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
 };
 
@@ -207,20 +207,11 @@ const RECIPE: FileWords = FileWords {
     extensions: &["json"],
 };
 
-/// Returns the export of the recipe of the source.
-pub fn recipe_export(shared: &Shared) -> Export<'static> {
-    let ask = shared.setup().map(|setup| -> Ask<'static> {
-        Box::new(move || {
-            let stem = file_stem("recipe", &setup);
-            let contents = Contents::new(move |path| RecipeFile::from(&setup).save(path));
-            Effect::ChooseFile(FileTask::save(RECIPE, &stem, contents))
-        })
-    });
-    Export {
-        group: ExportGroup::Training,
-        name: "Recipe".to_owned(),
-        form: "JSON".to_owned(),
-        description: RECIPE.description,
-        ask,
-    }
+/// Returns the file of the recipe of the source.
+pub fn recipe_task(shared: &Shared) -> Result<FileTask, String> {
+    let setup = shared.setup()?;
+    let stem = file_stem("recipe", &setup);
+    Ok(FileTask::save(RECIPE, &stem, move |path| {
+        RecipeFile::from(&setup).save(path)
+    }))
 }

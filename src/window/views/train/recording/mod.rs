@@ -15,5 +15,5 @@ mod reading;
 mod samples_card;
 
 pub use editor::RecordingEditor;
-pub use files_section::recipe_export;
+pub use files_section::recipe_task;
 pub(super) use options::bias;
