@@ -205,7 +205,7 @@ impl RecordingEditor {
     fn take_found(&mut self, mut reopened: Reopened, missing: PathBuf, found: PathBuf) {
         let name = file_name(&found);
         let open = move |watch: Watch<'_>| {
-            reopened.relocate(&missing, &found)?;
+            reopened.relocate(&missing, &found);
             reopen(reopened, watch)
         };
         self.reading.open(name, true, open);

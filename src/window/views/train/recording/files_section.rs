@@ -105,7 +105,7 @@ impl RecordingEditor {
                 dim_ui(ui, &format!("{channels}, {samples}"));
             }
             (None, State::Checking) => drop(dim_ui(ui, &format!("{channels}, checking the import…"))),
-            (None, State::Idle | State::Opening { .. }) => {}
+            (None, _) => {}
         }
     }
 
@@ -132,15 +132,17 @@ impl RecordingEditor {
         });
     }
 
-    /// Shows the button that displays the columns in place of the results.
+    /// Shows the button that displays the columns in place of the results, or the results again.
     pub fn columns_button_ui(&mut self, ui: &mut Ui, shared: &Shared) {
-        if self.import.is_some() && !self.is_on_show(shared) {
-            let button = ui.add(ghost_button("Columns…"));
-            let hint = "Shows the columns of the files and their meanings in place of the results.";
-            if button.on_hover_text(hint).clicked() {
-                self.shows_columns = true;
-                ui.request_repaint();
-            }
+        let is_on_show = self.is_on_show(shared);
+        if self.import.is_none() || (is_on_show && shared.shown_run().is_none()) {
+            return;
+        }
+        let text = if is_on_show { "Show results" } else { "Columns…" };
+        let hint = "Shows the columns of the files and their meanings in place of the results, or the results again.";
+        if ui.add(ghost_button(text)).on_hover_text(hint).clicked() {
+            self.shows_columns = !is_on_show;
+            ui.request_repaint();
         }
     }
 }
@@ -165,10 +167,7 @@ fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<(Close, usize)> {
     for (number, (recording, test)) in import.tests().into_iter().enumerate() {
         let of = format!(" of {}", file_name(&recording));
         let what = format!(", for the test{}", if import.files.len() > 1 { &of } else { "" });
-        let close: Close = |editor, number| {
-            let import = editor.import.iter_mut();
-            import.for_each(|import| import.set_test_file(number, PathBuf::new()));
-        };
+        let close: Close = |editor, _| editor.import.iter_mut().for_each(|import| import.edit().test = None);
         files.push((close, number, test, what));
     }
     if let Some(path) = &recipe.positions {
@@ -178,7 +177,6 @@ fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<(Close, usize)> {
         };
         files.push((close, 0, path.clone(), ", positions".to_owned()));
     }
-    files.retain(|(_, _, path, _)| !path.as_os_str().is_empty());
     let mut closed = None;
     for (close_file, number, path, what) in files {
         let name = file_name(&path);

@@ -46,7 +46,19 @@ pub(super) fn open_files(
     (older, used): (&Import, &[String]),
     watch: Watch<'_>,
 ) -> Result<Opened, String> {
-    let new = with_tables_of_folders(new)?;
+    let of_folder = |path: PathBuf| {
+        if !path.is_dir() {
+            return Ok(vec![path]);
+        }
+        let found = Format::tables_in(&path).map_err(|error| format!("cannot read '{}': {error}", path.display()))?;
+        let refusal = || format!("'{}' is a folder without tables: open a file", path.display());
+        Some(found).filter(|found| !found.is_empty()).ok_or_else(refusal)
+    };
+    let new = new
+        .into_iter()
+        .map(of_folder)
+        .collect::<Result<Vec<_>, String>>()?
+        .concat();
     let document = new.iter().find_map(|path| Some((path, DocumentKind::of_file(path)?)));
     match (document, new.len()) {
         (None, _) => {}
@@ -54,13 +66,6 @@ pub(super) fn open_files(
         (Some((path, kind)), _) => {
             return Err(format!("'{}' is a {kind}: open it without other files", path.display()));
         }
-    }
-    let tests = older.tests();
-    if let Some(path) = new.iter().find(|path| tests.iter().any(|(_, test)| test == *path)) {
-        return Err(format!(
-            "'{}' is a file for the test, so it cannot be trained on: close it under “Files” first",
-            path.display()
-        ));
     }
     let (positions, recordings): (Vec<PathBuf>, Vec<PathBuf>) = new.into_iter().partition(|path| holds_positions(path));
     let has_recording = !(open.is_empty() && recordings.is_empty());
@@ -99,7 +104,7 @@ pub(super) fn open_files(
         suggested_plan_in_order(&inspected)
     };
     if !has_new {
-        plan.import.append = appended.iter().map(|set| older.matching(set, &paths)).collect();
+        plan.import.append = appended.iter().filter_map(|set| older.matching(set, &paths)).collect();
     }
     plan.import.positions = positions.into_iter().next();
     let inspected = inspect(&plan)?;
@@ -111,24 +116,6 @@ fn joined(file: PathBuf) -> Joined {
         file,
         ..Joined::default()
     }
-}
-
-/// Replaces folders by the tables in them.
-fn with_tables_of_folders(paths: Vec<PathBuf>) -> Result<Vec<PathBuf>, String> {
-    let mut files = Vec::new();
-    for path in paths {
-        if path.is_dir() {
-            let found = Format::tables_in(&path);
-            let mut found = found.map_err(|error| format!("cannot read '{}': {error}", path.display()))?;
-            if found.is_empty() {
-                return Err(format!("'{}' is a folder without tables: open a file", path.display()));
-            }
-            files.append(&mut found);
-        } else {
-            files.push(path);
-        }
-    }
-    Ok(files)
 }
 
 fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Opened, String> {
@@ -236,22 +223,10 @@ impl From<Plan> for Reopened {
 }
 
 impl Reopened {
-    /// Replaces a missing file by `found`, and other missing files by those of the same name and contents next to it.
-    ///
-    /// # Errors
-    /// If a file cannot be read.
-    pub(super) fn relocate(&mut self, missing: &Path, found: &Path) -> Result<(), String> {
-        self.recorded = self.recorded.relocated(missing, found);
+    /// Replaces a missing file by `found`, and other missing files by those of the same name next to it.
+    pub(super) fn relocate(&mut self, missing: &Path, found: &Path) {
         let folder = found.parent().unwrap_or(Path::new(""));
-        for file in self.recorded.files.clone() {
-            let neighbour = file.path.file_name().map(|name| folder.join(name));
-            if let Some(neighbour) = neighbour.filter(|neighbour| !file.path.exists() && neighbour.is_file())
-                && has_checksum(&neighbour, &file.crc32)?
-            {
-                self.recorded = self.recorded.relocated(&file.path, &neighbour);
-            }
-        }
-        Ok(())
+        self.recorded = self.recorded.relocated(missing, found).within(folder);
     }
 }
 
@@ -312,14 +287,14 @@ mod tests {
         assert_eq!(reopened.missing, [gone("sensor.csv"), gone("states.csv")]);
 
         let mut found = reopened.clone();
-        found.relocate(&gone("sensor.csv"), &at("sensor.csv")).unwrap();
+        found.relocate(&gone("sensor.csv"), &at("sensor.csv"));
         let Opened::Plan(import, found) = open(&found) else {
             panic!("the other file is next to it");
         };
         assert_eq!(import.plan.import.join[0].file, at("states.csv"));
         assert!(found.changed.is_empty());
 
-        reopened.relocate(&gone("sensor.csv"), &at("other.csv")).unwrap();
+        reopened.relocate(&gone("sensor.csv"), &at("other.csv"));
         let Opened::Plan(_, reopened) = open(&reopened) else {
             panic!("the other file is found");
         };

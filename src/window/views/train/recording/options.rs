@@ -428,7 +428,7 @@ impl RecordingEditor {
 fn samples_summary(import: &Import, settings: &RunSettings) -> String {
     let division = import.plan.division;
     let share = input_text((1000.0 * division.test_fraction).round() / 10.0);
-    let split = match import.tests().iter().find(|(_, test)| !test.as_os_str().is_empty()) {
+    let split = match import.tests().first() {
         Some((_, test)) => format!("test: {}", file_name(test)),
         None => format!("{}, {share} % test", division.by),
     };

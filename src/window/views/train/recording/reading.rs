@@ -14,7 +14,7 @@ use crate::window::job::{Background, JobError, Report, Wake};
 /// The task under way, or the outcome of the last one.
 #[derive(Debug)]
 pub(super) struct Reading {
-    job: Background<Event>,
+    job: Background<State>,
     /// The plan that is being checked, or was checked last.
     asked: Option<(Arc<Plan>, Seed)>,
     pub(super) state: State,
@@ -31,16 +31,11 @@ pub(super) enum State {
         progress: Option<Progress>,
         is_plan: bool,
     },
+    /// Contents of files that were opened, which the editor takes.
+    Opened(Result<Opened, String>),
     /// The samples of the plan are being imported.
     Checking,
     /// The samples of the plan, or the reason why there are none.
-    Checked(Result<Checked, String>),
-}
-
-#[derive(Debug)]
-enum Event {
-    Progress(Progress),
-    Opened(Result<Opened, String>),
     Checked(Result<Checked, String>),
 }
 
@@ -61,18 +56,15 @@ impl Reading {
         is_plan: bool,
         open: impl FnOnce(Watch<'_>) -> Result<Opened, String> + Send + 'static,
     ) {
-        let progress = None;
-        (self.asked, self.state) = (
-            None,
-            State::Opening {
-                names,
-                progress,
-                is_plan,
-            },
-        );
+        let opening = move |progress| State::Opening {
+            names: names.clone(),
+            progress,
+            is_plan,
+        };
+        (self.asked, self.state) = (None, opening(None));
         self.job.start(
-            move |report| open(&mut watch(report)),
-            |opened| Event::Opened(flat(opened)),
+            move |report| open(&mut watch(report, |progress| opening(Some(progress)))),
+            |opened| State::Opened(flat(opened)),
         );
     }
 
@@ -90,8 +82,8 @@ impl Reading {
         if let Some(plan) = plan {
             (self.asked, self.state) = (Some((Arc::clone(&plan), seed)), State::Checking);
             self.job.start(
-                move |report| check(&plan, seed, &mut watch(report)),
-                |checked| Event::Checked(flat(checked)),
+                move |report| check(&plan, seed, &mut watch(report, |_| State::Checking)),
+                |checked| State::Checked(flat(checked)),
             );
         }
     }
@@ -104,16 +96,12 @@ impl Reading {
 
     /// Returns the contents of files once they are read.
     pub(super) fn next_opened(&mut self) -> Option<Result<Opened, String>> {
-        while let Some(event) = self.job.next_event() {
-            match (event, &mut self.state) {
-                (Event::Progress(now), State::Opening { progress, .. }) => *progress = Some(now),
-                (Event::Progress(_), _) => {}
-                (Event::Checked(checked), _) => self.state = State::Checked(checked),
-                (Event::Opened(opened), _) => {
-                    self.state = State::Idle;
-                    return Some(opened);
-                }
+        while let Some(state) = self.job.next_event() {
+            if let State::Opened(opened) = state {
+                self.state = State::Idle;
+                return Some(opened);
             }
+            self.state = state;
         }
         None
     }
@@ -137,10 +125,10 @@ impl Reading {
     }
 }
 
-/// Reports the progress of reading, until the work is cancelled.
-fn watch(report: &Report<Event>) -> impl FnMut(Progress) -> ControlFlow<()> {
-    |progress| {
-        report.progress(Event::Progress(progress), |_, _| ());
+/// Reports the progress of reading as a state, until the work is cancelled.
+fn watch(report: &Report<State>, state: impl Fn(Progress) -> State) -> impl FnMut(Progress) -> ControlFlow<()> {
+    move |progress| {
+        report.progress(state(progress), |_, _| ());
         if report.is_cancelled() {
             ControlFlow::Break(())
         } else {
