@@ -45,8 +45,6 @@ pub struct RecordingEditor {
     pub(super) shows_columns: bool,
     /// The file asked for last, and where its path arrives.
     asked: Option<(Use, Receiver<PathBuf>)>,
-    /// File and name of a variable whose rows become the samples, and the meaning of its columns.
-    variable: Option<(usize, String, Meaning)>,
     /// A checkpoint that the worker could not resume.
     refused: Option<PathBuf>,
     /// The run that the window knew last.
@@ -79,7 +77,6 @@ impl RecordingEditor {
             typed: BTreeMap::new(),
             shows_columns: false,
             asked: None,
-            variable: None,
             refused: None,
             run: None,
             held_out: None,
@@ -177,26 +174,19 @@ impl RecordingEditor {
         }
     }
 
-    /// Makes the rows of a variable the samples, and gives its columns this meaning.
-    pub(super) fn take_variable(&mut self, file: usize, name: String, meaning: Meaning) {
-        self.variable = Some((file, name, meaning));
-        self.read_again();
-    }
-
     fn open_files(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
         let older = self.import.clone().unwrap_or_default();
-        let used = older.used(self.variable.as_ref().map(|(file, name, _)| (*file, name.as_str())));
         let names = if new.is_empty() { &open } else { &new };
         let names = Vec::from_iter(names.iter().map(|path| file_name(path))).join(", ");
         self.reading
-            .open(names, false, move |watch| open_files(new, open, (&older, &used), watch));
+            .open(names, false, move |watch| open_files(new, open, &older, watch));
     }
 
     /// Opens the sample recording, which is written into `folder`.
     pub(super) fn open_sample(&mut self, folder: PathBuf) {
         let open = move |watch: Watch<'_>| {
             let new = vec![write_sample(&folder)?];
-            open_files(new, Vec::new(), (&Import::default(), &[]), watch)
+            open_files(new, Vec::new(), &Import::default(), watch)
         };
         self.reading.open("sample recording".to_owned(), false, open);
     }
@@ -222,7 +212,6 @@ impl RecordingEditor {
                 }
                 Err(reason) => effects.push(failed(reason)),
             }
-            self.variable = None;
         }
         let run = shared.run.as_ref().map(|run| run.id);
         if run != self.run {
@@ -279,7 +268,6 @@ impl RecordingEditor {
             Opened::Recordings(import) => {
                 let import = import.keeping(self.import.take().unwrap_or_default());
                 (self.import, self.missing) = (holding_out(import), None);
-                self.settle_variable();
                 self.show_columns(effects);
             }
             Opened::Plan(import, reopened) => {
@@ -332,20 +320,6 @@ impl RecordingEditor {
                     effects.push(Effect::OpenTraining(path));
                 }
             }
-        }
-    }
-
-    /// Gives the columns of the variable that the user chose their meaning.
-    fn settle_variable(&mut self) {
-        let (Some((file, name, meaning)), Some(import)) = (self.variable.take(), &mut self.import) else {
-            return;
-        };
-        let mut variables = import.files.get(file).into_iter().flat_map(|file| &file.variables);
-        if let Some(columns) = variables
-            .find(|variable| variable.name == name)
-            .map(|found| found.columns.clone())
-        {
-            import.set_meanings(file, columns, meaning);
         }
     }
 

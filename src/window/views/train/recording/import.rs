@@ -25,6 +25,8 @@ pub(super) struct Import {
     chosen: BTreeMap<ColumnKey, Meaning>,
     /// Units, likewise.
     units: BTreeMap<ColumnKey, String>,
+    /// File and name of a variable whose rows are to be the samples, and the meaning that its columns get.
+    pub(super) wanted: Option<(usize, String, Meaning)>,
 }
 
 impl Import {
@@ -112,15 +114,22 @@ impl Import {
             }
         }
         self.write_meanings(older.plan.import.has_groups());
+        if let Some((file, name, meaning)) = older.wanted
+            && let mut variables = self.files.get(file).into_iter().flat_map(|file| &file.variables)
+            && let Some(variable) = variables.find(|variable| variable.name == name)
+        {
+            let columns = variable.columns.clone();
+            self.set_meanings(file, columns, meaning);
+        }
         self
     }
 
-    /// Full names of the columns in use; in the file with a `variable` whose rows are to be the samples, only that.
-    pub(super) fn used(&self, variable: Option<(usize, &str)>) -> Vec<String> {
-        let of_file = |(number, file): (usize, &InspectedFile)| match variable {
-            Some((of_file, name)) if of_file == number => {
-                let stem = file.stem.iter().map(String::as_str);
-                vec![Vec::from_iter(stem.chain([name])).join(".")]
+    /// Full names of the columns in use; in the file with a variable that is wanted, only that.
+    pub(super) fn used(&self) -> Vec<String> {
+        let of_file = |(number, file): (usize, &InspectedFile)| match &self.wanted {
+            Some((of_file, name, _)) if *of_file == number => {
+                let stem = file.stem.iter().chain([name]);
+                vec![Vec::from_iter(stem.map(String::as_str)).join(".")]
             }
             _ => names(file, |meaning| meaning != Meaning::Unused),
         };

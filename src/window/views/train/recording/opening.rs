@@ -39,11 +39,11 @@ pub(super) enum Opened {
 }
 
 /// Opens the files at `new`, of which one may be a recipe, a network or a checkpoint. Recordings are added to those at `open`,
-/// which are those of the `older` import; `used` are full names of columns and variables whose rows are the samples.
+/// which are those of the `older` import.
 pub(super) fn open_files(
     new: Vec<PathBuf>,
     open: Vec<PathBuf>,
-    (older, used): (&Import, &[String]),
+    older: &Import,
     watch: Watch<'_>,
 ) -> Result<Opened, String> {
     let of_folder = |path: PathBuf| {
@@ -90,7 +90,7 @@ pub(super) fn open_files(
     let mut inspect = |plan: &Plan| {
         let mut import = older.merged(plan.clone()).import;
         import.time = import.time.or_else(|| time.clone());
-        let inspected = import.inspect(Path::new(""), used, watch);
+        let inspected = import.inspect(Path::new(""), &older.used(), watch);
         inspected.map_err(|error| in_window(&error))
     };
     let mut plan = Plan::default();
