@@ -237,7 +237,7 @@ fn a_checkpoint_continues_as_if_it_had_never_stopped() {
     other.settle();
     assert!(!other.has("Meaning of u1"), "the results are displayed");
     other.limit_epochs("2");
-    other.click_button("Continue");
+    other.click_button("Train longer");
     other.wait("the end", |driver| {
         let result = driver.state().result();
         result.is_some_and(|result| result.is_idle && result.epochs_run == 5)
