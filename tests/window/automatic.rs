@@ -73,7 +73,7 @@ fn chosen_settings_are_disabled_show_what_was_chosen_and_are_kept_when_the_choic
     }
     assert_eq!(driver.state().settings(), chosen);
     // The trained network can be trained further.
-    assert!(driver.has("Continue"));
+    assert!(driver.has("Train longer"));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::window::{
     job::{Background, Wake},
     shared::{Effect, Shared, Shown, SourceKind, Status, Tone, View},
     theme::space,
-    widgets::{card_ui, dim_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui},
+    widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui},
 };
 
 /// The Sensor view.
@@ -93,7 +93,6 @@ impl View for SensorView {
         let mut settings = shared.draft;
         scrolled_ui(ui, "sensor form", |ui| {
             if shared.source == SourceKind::Recording {
-                dim_ui(ui, RECORDED);
                 return;
             }
             ui.add_enabled_ui(!shared.phase.is_busy(), |ui| {
@@ -117,7 +116,8 @@ impl View for SensorView {
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         let whole = ui.available_rect_before_wrap();
         if shared.source == SourceKind::Recording {
-            card_ui(ui, whole, |ui| placeholder_ui(ui, RECORDED));
+            let text = "This view computes what the readings of a simulated array determine. For a recording, Study measures it.";
+            card_ui(ui, whole, |ui| placeholder_ui(ui, text));
             return Some(Status::new(Tone::Calm, "No simulated array".to_owned()));
         }
         if let Some(simulation) = shared.draft.simulation() {
@@ -142,7 +142,7 @@ impl View for SensorView {
             }
             (None, None) => {
                 card_ui(ui, whole, |ui| {
-                    placeholder_ui(ui, "The singular values are being computed.")
+                    placeholder_ui(ui, "The singular values are being computed.");
                 });
                 Status::new(Tone::Calm, "Nothing computed yet".to_owned())
             }
@@ -155,6 +155,3 @@ impl View for SensorView {
         })
     }
 }
-
-const RECORDED: &str =
-    "This view computes what the readings of a simulated array determine. For a recording, Study measures it.";
