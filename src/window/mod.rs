@@ -31,4 +31,4 @@ mod widgets;
 
 pub use frame::{DecouplerWindow, Desktop, OpenError, WindowFile, open};
 pub use shared::{Effect, Matter, Notice, Phase, Shared, SourceKind};
-pub use views::{BottomTab, DecoderResult, Touch, Views};
+pub use views::{DecoderResult, Views};

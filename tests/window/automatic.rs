@@ -92,7 +92,7 @@ fn another_seed_is_no_setting_of_the_choice_but_another_plan_is_chosen_for_again
 #[test]
 fn a_given_memory_is_kept_by_the_choice() {
     let (mut driver, _path, _folder) = opened(90);
-    driver.unfold_to("Memory", "Lags");
+    driver.unfold_to("History of readings", "Lags");
     assert!(driver.says("Chosen automatically while these fields are empty"));
     driver.enter("Lags", "3");
     driver.settle();

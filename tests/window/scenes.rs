@@ -44,7 +44,7 @@ fn known_rows_train_one_small_network_for_each_row() {
     assert_eq!(run.network().values().len(), 10);
     assert_eq!(driver.state().run.as_ref().unwrap().weights, 1560);
     assert_eq!(driver.table(), table_of(&run));
-    assert!(driver.has("Decoupled surface"));
+    assert!(driver.has("Decoded surface"));
     driver.settle();
 }
 
@@ -70,7 +70,7 @@ fn with_one_row_only_that_row_is_drawn() {
     }
     driver.click_button("Top view");
     driver.settle();
-    assert!(driver.has("Decoupled surface"));
+    assert!(driver.has("Decoded surface"));
 
     // A smaller array has a last row too.
     driver.enter("Array scale", "2x3_2x9");

@@ -152,7 +152,7 @@ impl DecouplerWindow {
                 }
             }
             Reply::Restart => self.restart_worker(),
-            Reply::Reconnect => self.views.live.retry(&self.shared, effects),
+            Reply::Reconnect => self.views.live.start(&self.shared, effects),
             Reply::Resume => {
                 self.notices.settle(Matter::CutShort);
                 self.begin(Origin::Left);

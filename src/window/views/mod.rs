@@ -18,7 +18,7 @@ use super::{
 use decoupler_files::import::Plan;
 
 pub(super) use train::CHECKPOINT;
-pub use train::{BottomTab, DecoderResult, Touch};
+pub use train::DecoderResult;
 
 use self::{compare::CompareView, live::LiveView, sensor::SensorView, study::StudyView, train::TrainView};
 
