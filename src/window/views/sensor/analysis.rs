@@ -17,8 +17,6 @@ use glam::DVec3;
 pub(super) struct Analysis {
     /// The sensor.
     pub sensor: SensorModel,
-    /// The rows that are read, the movement, and the noise of the readings.
-    pub scene: Scene,
     /// Each row-wire that is read, with its nodes pressed by half the stroke.
     pub rows: Vec<Identifiability>,
     /// Index in [`Self::rows`] of the row with the smallest singular value.
@@ -77,7 +75,6 @@ impl Analysis {
         let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
         Ok(Some(Self {
             sensor: *sensor,
-            scene: *scene,
             worst,
             noise,
             prior_mm,
