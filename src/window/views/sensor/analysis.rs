@@ -228,8 +228,10 @@ mod tests {
 
     #[test]
     fn a_mirrored_layout_gives_a_warning_unless_the_row_is_known() {
-        let mut question = Simulation::default();
-        question.sensor = SensorModel::new("10x6_3x18".parse().unwrap());
+        let mut question = Simulation {
+            sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
+            ..Simulation::default()
+        };
         // Column nodes at 7.5, 12.5 and 17.5 mirror the rows about x = 12.5.
         question.sensor.geometry.column_node_x0_mm = 7.5;
         let is_alike = |found: &Analysis| {
