@@ -82,8 +82,8 @@ fn presets_set_the_array_and_its_surface_follows() {
         assert_eq!(driver.state().draft.simulation().unwrap().sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
-            let frame = &driver.views().train.drawn.frames.actual;
-            frame.nodes_mm.len() == scale.rows() * scale.nodes_per_row()
+            let drawn = driver.views().train.drawn.surfaces.as_ref();
+            drawn.is_some_and(|drawn| drawn.actual.nodes.len() == scale.rows() * scale.nodes_per_row())
         });
     }
     driver.settle();
@@ -222,9 +222,11 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
         .views()
         .train
         .drawn
-        .frames
+        .surfaces
+        .as_ref()
+        .unwrap()
         .actual
-        .nodes_mm
+        .nodes
         .iter()
         .map(|node| node.x)
         .collect();

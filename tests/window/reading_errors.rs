@@ -77,8 +77,8 @@ fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
     driver.click("Nodes");
     driver.settle();
     let plot = plot_place(&mut driver, "z (mm) against node");
-    let frames = &driver.views().train.drawn.frames;
-    let (nodes, count) = (frames.actual.nodes_mm.len(), 60);
+    let drawn = driver.views().train.drawn.surfaces.as_ref().unwrap();
+    let (nodes, count) = (drawn.actual.nodes.len(), 60);
     assert_eq!(nodes, count, "10 × 6");
     // Across the plot at all heights: the path crosses some points, and gaps between them.
     let mut found = Vec::new();

@@ -18,7 +18,7 @@ use crate::{
     window::{
         job::{Background, Wake},
         preview::PreviewEvent,
-        shared::{Command, Effect, Matter, Notice, RunsWorker, Shared, ViewKind, training_status},
+        shared::{Command, Effect, Matter, Notice, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
         theme::{self, Theme, space},
         training_worker::{Request, Worker},
         views::Views,
@@ -126,7 +126,7 @@ impl DecouplerWindow {
     /// the window closes.
     #[must_use]
     pub fn keeping_runs(self, path: PathBuf) -> Self {
-        self.runs.open(path);
+        self.runs.ask(RunsRequest::Open(path));
         self
     }
 
@@ -179,7 +179,7 @@ impl DecouplerWindow {
     pub fn show_ui(&mut self, ui: &mut Ui) {
         // Another window may have changed the run list.
         if ui.input(|input| input.events.contains(&Event::WindowFocused(true))) {
-            self.runs.look();
+            self.runs.ask(RunsRequest::Look);
         }
         let mut effects = Vec::new();
         let offers = self.take_commands(ui.ctx(), &mut effects);

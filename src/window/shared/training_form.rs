@@ -41,8 +41,6 @@ pub enum Effect {
     Continue,
     /// Set the look of all surfaces.
     Look(Look),
-    /// Decode this snapshot in the results to come.
-    Watch(usize),
     /// Ask for the path of a file.
     ChooseFile(FileTask),
     /// Let the user choose the form of an export.
