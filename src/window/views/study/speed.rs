@@ -72,7 +72,7 @@ impl Default for SpeedForm {
         Self {
             noises: list(AxisKind::Noise, "0, 1e-4, 1e-3, 1e-2"),
             hidden: list(AxisKind::Hidden, "6, 12"),
-            methods: list(AxisKind::Method, "br, lm"),
+            methods: list(AxisKind::Method, "lm, br"),
             preset: None,
             decoders: [true; DecoderKind::ALL.len()],
             is_full: false,
@@ -593,12 +593,12 @@ mod tests {
             });
             Vec::from_iter(held_out)
         };
-        assert_eq!(held_out(&of), [("br", 0.0), ("lm", 0.2)]);
+        assert_eq!(held_out(&of), [("lm", 0.2), ("br", 0.0)]);
         // A share set by the user applies to every method.
         let mut chosen = Plan::default();
         chosen.division.validation_fraction = Some(0.3);
         let of = plan(&SpeedForm::default(), recording(&chosen));
-        assert_eq!(held_out(&of), [("br", 0.3), ("lm", 0.3)]);
+        assert_eq!(held_out(&of), [("lm", 0.3), ("br", 0.3)]);
     }
 
     #[test]
