@@ -173,8 +173,7 @@ impl ExperimentForm {
         let hint = "Largest number of epochs per training. The paper does not state its own.";
         let epochs = &mut base.training.stopping.epochs;
         count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MAX_EPOCHS);
-        let hint =
-            "Number of trainings from different random weights; the one with the lowest validation error is kept.";
+        let hint = "Number of trainings from other random weights; that with the lowest validation error is kept.";
         count_ui(ui, "Restarts", hint, &mut base.starts, 1..=MAX_STARTS);
     }
 

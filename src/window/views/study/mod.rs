@@ -83,8 +83,7 @@ impl Topic {
             Self::Table(PaperTable::CrossValidation) => [
                 "Table 2",
                 "Run",
-                "Cross-validation of a large and a small dataset, shuffled again in each repeat, and the scatter of the \
-                 errors over the folds (the paper's Fig. 5).",
+                "Cross-validation of a large and a small dataset, shuffled in each repeat (the paper's Fig. 5).",
             ],
             Self::Table(PaperTable::ArrayScales) => [
                 "Table 3",
@@ -99,14 +98,12 @@ impl Topic {
             Self::Speed => [
                 "Speed against accuracy",
                 "Measure",
-                "The error, the time for a frame and the training time of every decoder, for an array at several noise \
-                 levels, measured on this machine.",
+                "The error, the time for a frame and the training time of every decoder, on this machine.",
             ],
             Self::Readings => [
                 "What the readings determine",
                 "Analyse",
-                "How well the readings of a recording determine each target: measured on held-out samples in seconds, \
-                 with confidence intervals of 95 % from independent stretches or groups of samples.",
+                "How well the readings of a recording determine each target, measured on held-out samples in seconds.",
             ],
             Self::Folds => [
                 "Cross-validation",

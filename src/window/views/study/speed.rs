@@ -156,32 +156,36 @@ impl SpeedForm {
             ..base.scene.noise
         };
         let of_preset = preset.simulation_in(noise);
-        let mut source = Simulation {
+        let rows = of_preset.scene.rows;
+        let source = Simulation {
             sensor: base.sensor,
             scene: Scene {
-                rows: of_preset.scene.rows,
+                rows,
                 noise,
                 ..base.scene
             },
             test_samples: self.test_samples,
             ..of_preset
         };
-        let mut settings = preset.settings_in(noise);
-        if !self.is_full {
-            source.samples = source.samples.min(self.samples);
-            source.validation_samples = source.validation_samples.min(source.samples.div_ceil(5));
-            self.shorten(&mut settings);
-        }
-        RunSettings {
+        self.shortened(RunSettings {
             source: source.into(),
             seed,
-            ..settings
-        }
+            ..preset.settings_in(noise)
+        })
     }
 
-    fn shorten(&self, settings: &mut RunSettings) {
+    /// Returns the settings of a quick look, unless the form asks for full trainings.
+    fn shortened(&self, mut settings: RunSettings) -> RunSettings {
+        if self.is_full {
+            return settings;
+        }
         let epochs = &mut settings.training.stopping.epochs;
         *epochs = (*epochs).min(self.epochs);
+        if let Some(array) = settings.simulation_mut() {
+            array.samples = array.samples.min(self.samples);
+            array.validation_samples = array.validation_samples.min(array.samples.div_ceil(5));
+        }
+        settings
     }
 
     /// Returns a run for each method, on the recording of `base`. Decoders without a network do not depend on the method, so
@@ -203,9 +207,7 @@ impl SpeedForm {
             if method.short_name() != present.short_name() {
                 settings.choose_method(method);
             }
-            if !self.is_full {
-                self.shorten(&mut settings);
-            }
+            let settings = self.shortened(settings);
             let mut plan = base.plan().cloned().ok_or("This is not a recording.")?;
             // A share set by the user is kept.
             if plan.division.validation_fraction == Some(base.settings().validation_fraction()) {
@@ -226,8 +228,7 @@ impl SpeedForm {
     /// Shows the fields; `is_array` for a simulated array.
     pub fn fields_ui(&mut self, ui: &mut Ui, is_array: bool) {
         if is_array {
-            let hint = "Noise of each reading (standard deviation), relative to the reading. Separate several levels \
-                        with commas.";
+            let hint = "Noise of each reading (standard deviation), relative to the reading, separated by commas.";
             self.noises.ui(ui, None, hint);
         }
         let hint = "Numbers of hidden nodes of the networks, separated by commas.";
@@ -278,11 +279,9 @@ impl SpeedForm {
 /// Shows the limits for the recommended decoders, which apply to the results that are shown.
 pub fn limits_ui(ui: &mut Ui, limits: &mut TradeOffLimits) {
     section_heading_ui(ui, "Recommended decoders");
-    let hint = "Finds the decoder with the shortest decoding time among those whose Z error, or mean absolute error in \
-                percent of the range of a recording's targets, is at most this.";
+    let hint = "Finds the fastest decoder whose error (of Z, or in percent of the range of a target) is at most this.";
     quantity_ui(ui, "Fastest under", hint, &mut limits.percent, 1e-15..=1e6, "%");
-    let hint = "Finds the decoder with the smallest error among those that decode a frame, or a sample of a recording, \
-                within this time, in µs.";
+    let hint = "Finds the most accurate decoder of a frame, or of a sample of a recording, within this time.";
     let time = &mut limits.microseconds;
     quantity_ui(ui, "Most accurate under", hint, time, 1e-6..=1e12, "µs");
 }

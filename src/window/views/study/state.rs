@@ -167,6 +167,9 @@ impl StudyView {
     }
 
     fn start(&mut self, task: Task) {
+        if self.is_folder() {
+            self.cancel();
+        }
         let study = Study {
             report: task.outcome.report(&self.limits),
             outcome: task.outcome,
@@ -221,11 +224,8 @@ impl StudyView {
 
     /// Returns true while a measurement of times waits for other work.
     pub(super) fn is_waiting(&self) -> bool {
-        let measures = self
-            .running
-            .as_ref()
-            .is_some_and(|running| running.topic == Topic::Speed);
-        measures && !self.is_quiet.load(Ordering::Relaxed)
+        let topic = self.running.as_ref().map(|running| running.topic);
+        topic == Some(Topic::Speed) && !self.is_quiet.load(Ordering::Relaxed)
     }
 
     /// Returns the results of the topic.
@@ -301,7 +301,7 @@ impl View for StudyView {
             self.refresh(topic);
         }
         if let Ok(path) = self.folders.1.try_recv()
-            && self.running.is_none()
+            && self.is_idle()
         {
             self.choose(Topic::Sweep);
             self.start(sweep_folder::task(path));

@@ -125,7 +125,7 @@ pub fn report_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look
     let has_aside = is_preview || !page.notes.is_empty();
     let height = match (has_table, page.figure.is_some() || has_aside) {
         (true, true) => (space(6) * page.rows.len() as f32 + space(28)).min(0.53 * whole.height()),
-        (false, true) => space(18),
+        (false, true) => space(20),
         (_, false) => whole.height(),
     };
     let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height.round());
@@ -211,17 +211,17 @@ fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared) -> Opti
 
 const SPECIFICATION: FileWords = FileWords {
     kind: "specification",
-    description: "This sweep for the terminal, on one machine or many: decoupler sweep trains it, or a part of it, and \
-                  fills a folder.",
+    description: "This sweep for the command decoupler sweep, which trains it, or a part of it, and fills a folder.",
     extensions: &["json"],
 };
 
 /// Sweeps on other machines: saves the sweep of the form as a specification, opens a folder that is being filled.
 fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
     section_heading_ui(ui, "On many machines");
-    let text = "The command decoupler sweep trains a specification on any number of machines and fills a folder, which is \
-                shown here.";
-    dim_ui(ui, text);
+    dim_ui(
+        ui,
+        "The command decoupler sweep trains a specification anywhere and fills a folder, which is shown here.",
+    );
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.y = space(1);
         let save = ui.add_enabled(view.task.is_ok(), ghost_button("Save specification…"));
@@ -236,7 +236,7 @@ fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
             });
             effects.push(Effect::ChooseFile(task));
         }
-        let open = ui.add(ghost_button("Open sweep folder…"));
+        let open = ui.add_enabled(view.is_idle(), ghost_button("Open sweep folder…"));
         let open = open.on_hover_text("Shows the trials of a folder that decoupler sweep fills, as they finish.");
         if open.clicked() {
             let task = FileTask::choose(FOLDER, "", view.folders.0.clone());
