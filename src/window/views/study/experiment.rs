@@ -17,7 +17,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        ExperimentColumnKind, ExperimentTable, Table, cells_table, describe_conditions, describe_failures,
+        ExperimentColumnKind, ExperimentTable, cells_table, describe_conditions, describe_failures,
         describe_worse_than_mean, sweep_specification, trials_table,
     },
     figure::{TradeOffLimits, experiment_figure},
@@ -25,7 +25,9 @@ use decoupler_files::{
 };
 use eframe::egui::{ComboBox, Ui};
 
-use super::{Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label};
+use super::{
+    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label,
+};
 use crate::window::{
     shared::Effect,
     theme::space,
@@ -347,7 +349,7 @@ impl Outcome for ExperimentOutcome {
         }
     }
 
-    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+    fn tables(&self) -> Vec<NamedTable<'_>> {
         vec![
             ("Every cell", Box::new(|| cells_table(&self.results))),
             ("Every trial", Box::new(|| trials_table(&self.results))),

@@ -122,7 +122,7 @@ impl Topic {
 #[derive(Clone, Debug, PartialEq)]
 enum Form {
     /// A table or a sweep.
-    Experiment(ExperimentForm),
+    Experiment(Box<ExperimentForm>),
     /// Speed against accuracy.
     Speed(SpeedForm),
     /// What the readings determine, or a cross-validation with a number of folds.
@@ -136,8 +136,8 @@ impl Form {
     /// Returns the default form of a topic.
     fn new(topic: Topic) -> Self {
         match topic {
-            Topic::Table(table) => Self::Experiment(ExperimentForm::table(table)),
-            Topic::Sweep => Self::Experiment(ExperimentForm::sweep()),
+            Topic::Table(table) => Self::Experiment(ExperimentForm::table(table).into()),
+            Topic::Sweep => Self::Experiment(ExperimentForm::sweep().into()),
             Topic::Speed => Self::Speed(SpeedForm::default()),
             Topic::Readings => Self::Recording(None),
             Topic::Folds => Self::Recording(Some(5)),
@@ -199,8 +199,10 @@ struct Task {
     /// Setup of the recording, if it is about the one of the Train view.
     setup: Option<Setup>,
     /// Does the work, or says why that is not possible and what to do.
-    run: Box<dyn FnOnce(&Reporter) -> Result<(), String> + Send>,
+    run: Box<Work>,
 }
+
+type Work = dyn FnOnce(&Reporter) -> Result<(), String> + Send;
 
 /// Sending end of the events of a task.
 type Reporter = job::Report<StudyEvent>;
@@ -226,6 +228,9 @@ enum StudyEvent {
     Ended(Result<(), String>),
 }
 
+/// A table and its name.
+type NamedTable<'a> = (&'static str, Box<dyn Fn() -> Table + 'a>);
+
 /// Results so far.
 trait Outcome: Debug {
     /// Adds what an event reports.
@@ -248,7 +253,7 @@ trait Outcome: Debug {
     }
 
     /// Returns tables for programs, with their names.
-    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+    fn tables(&self) -> Vec<NamedTable<'_>> {
         Vec::new()
     }
 }

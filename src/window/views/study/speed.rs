@@ -19,18 +19,19 @@ use decoupler_core::{
     },
     job::Job,
     scene::{Noise, Scene},
+    sensor::SensorModel,
     text::counted,
     training::{Method, StoppingRules},
 };
 use decoupler_files::{
-    export::{NetworkFile, Table, format_percent, trade_off_points, trade_off_summary},
+    export::{NetworkFile, format_percent, trade_off_points, trade_off_summary},
     figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure},
     import::{Recorded, Setup, SetupSets},
     machine::memory_budget,
 };
 use eframe::egui::Ui;
 
-use super::{Note, Outcome, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
+use super::{NamedTable, Note, Outcome, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
 use crate::window::{
     shared::{Effect, Exporting, NetworkSource, sentence},
     widgets::{
@@ -138,39 +139,39 @@ impl SpeedForm {
         for noise in self.noises.numbers()? {
             let presets = Preset::ALL.into_iter();
             let presets = presets.filter(|preset| self.preset.is_none_or(|only| only == *preset));
+            let scene = Scene {
+                noise: Noise {
+                    relative: noise,
+                    ..base.scene.noise
+                },
+                ..base.scene
+            };
+            scene.check().map_err(|error| error.to_string())?;
             runs.extend(presets.map(|preset| PlannedRun {
                 noise: Some(noise),
                 preset: Some(preset),
-                setup: self.settings(base, seed, preset, noise).into(),
+                setup: self.settings(base.sensor, scene, seed, preset).into(),
                 decoders: decoders.to_vec(),
             }));
         }
         Ok(runs)
     }
 
-    /// Returns the settings of a preset at a noise level, with the sensor and the scene of `base`. The preset
-    /// determines the rows that are read and the inputs of the networks.
-    fn settings(&self, base: &Simulation, seed: Seed, preset: Preset, noise: f64) -> RunSettings {
-        let noise = Noise {
-            relative: noise,
-            ..base.scene.noise
-        };
-        let of_preset = preset.simulation_in(noise);
+    /// Returns the settings of a preset with this sensor and scene. The preset determines the rows that are read and the
+    /// inputs of the networks.
+    fn settings(&self, sensor: SensorModel, scene: Scene, seed: Seed, preset: Preset) -> RunSettings {
+        let of_preset = preset.simulation_in(scene.noise);
         let rows = of_preset.scene.rows;
         let source = Simulation {
-            sensor: base.sensor,
-            scene: Scene {
-                rows,
-                noise,
-                ..base.scene
-            },
+            sensor,
+            scene: Scene { rows, ..scene },
             test_samples: self.test_samples,
             ..of_preset
         };
         self.shortened(RunSettings {
             source: source.into(),
             seed,
-            ..preset.settings_in(noise)
+            ..preset.settings_in(scene.noise)
         })
     }
 
@@ -482,7 +483,7 @@ impl Outcome for SpeedOutcome {
         Some(Exporting::decoder(of_point.report.kind, source))
     }
 
-    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+    fn tables(&self) -> Vec<NamedTable<'_>> {
         vec![("All points", Box::new(|| trade_off_points(&self.levels)))]
     }
 }
@@ -608,7 +609,7 @@ mod tests {
             form.plan(&RunSettings::default().into()).unwrap_err()
         };
         assert!(error(|form| form.noises.values = "0, much".to_owned()).contains("'much' is not a number"));
-        assert!(error(|form| form.noises.values = "2".to_owned()).contains("give from 0 to 1"));
+        assert!(error(|form| form.noises.values = "2".to_owned()).contains("relative noise"));
         assert!(error(|form| form.noises.values = " , ".to_owned()).contains("there are no values"));
         assert!(error(|form| form.decoders.fill(false)).contains("choose at least one"));
         let many = error(|form| {
