@@ -69,7 +69,6 @@ fn settings(draft: &RunSettings, preset: Preset, noise: f64) -> RunSettings {
         samples: 100,
         validation_samples: of_preset.validation_samples.min(20),
         test_samples: 20,
-        ..of_preset
     }
     .into();
     settings
