@@ -77,24 +77,6 @@ impl TestSet {
             Self::Recording(test) => test.set.samples(),
         }
     }
-
-    /// Returns the description of the channels of a recording; `None` for a simulated array.
-    pub fn problem(&self) -> Option<&Problem> {
-        self.recording().map(|test| &*test.problem)
-    }
-}
-
-/// Appearance of the surfaces of a test set.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SurfaceStyle {
-    /// Perspective view or top view.
-    pub mode: ViewMode,
-    /// Colour map of heights.
-    pub colours: SequentialMap,
-    /// Range of heights shown by colours and axes.
-    pub heights: HeightScale,
-    /// Range of the error colours in millimetres, if locked; else that of the displayed errors.
-    pub error_limit_mm: Option<f64>,
 }
 
 /// Range of heights shown by colours and axes.
@@ -211,30 +193,35 @@ impl TestView {
         self.set.readings().select(Axis(0), samples)
     }
 
-    /// Returns the surface of heights.
-    pub fn heights(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
-        Surface {
-            quantity: Quantity::Height,
-            range: match style.heights {
-                HeightScale::Stroke => self.z_range_mm(),
-                HeightScale::Fitted => frame.range_mm().unwrap_or_else(|| self.z_range_mm()),
-            },
-            ..self.errors(title, frame, style)
-        }
+    /// Returns the surface of heights, over the whole stroke.
+    pub fn heights(&self, title: impl Into<String>, frame: &Frame) -> Surface {
+        self.through(title, frame, Quantity::Height, self.z_range_mm())
     }
 
     /// Returns the surface of errors of z.
-    pub fn errors(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
-        let locked = style.error_limit_mm.map(|limit| -limit..=limit);
+    pub fn errors(&self, title: impl Into<String>, frame: &Frame) -> Surface {
+        let errors = frame.nodes_mm.iter().map(|node| node.z.abs());
+        // The resolution is a nanometre.
+        let largest = errors.filter(|error| error.is_finite()).fold(1e-6, f64::max);
+        self.through(title, frame, Quantity::Error, -largest..=largest)
+    }
+
+    fn through(
+        &self,
+        title: impl Into<String>,
+        frame: &Frame,
+        quantity: Quantity,
+        range: RangeInclusive<f64>,
+    ) -> Surface {
         Surface {
             title: title.into(),
             map: Arc::clone(&self.surface),
             values: Arc::clone(&frame.grid_mm),
             nodes: Arc::clone(&frame.nodes_mm),
-            quantity: Quantity::Error,
-            range: locked.unwrap_or_else(|| frame.symmetric_range_mm()),
-            mode: style.mode,
-            colours: style.colours,
+            quantity,
+            range,
+            mode: ViewMode::default(),
+            colours: SequentialMap::default(),
         }
     }
 }
@@ -304,15 +291,6 @@ impl Frame {
         let (low, high) = (heights().reduce(f64::min)?, heights().reduce(f64::max)?);
         // The resolution is a nanometre.
         Some(low..=high.max(low + 1e-6))
-    }
-
-    /// Returns a range symmetric about zero that contains z of all nodes, so that zero keeps its colour.
-    pub fn symmetric_range_mm(&self) -> RangeInclusive<f64> {
-        let heights = self.nodes_mm.iter().map(|node| node.z.abs());
-        let largest = heights.filter(|z| z.is_finite()).fold(0.0, f64::max);
-        // The resolution is a nanometre.
-        let largest = largest.max(1e-6);
-        -largest..=largest
     }
 }
 

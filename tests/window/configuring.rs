@@ -31,7 +31,7 @@ fn the_window_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
         "{value}"
     );
     assert!(driver.says("1 of 10"), "100 test samples are 10 snapshots of 10 rows");
-    assert!(!driver.has("Decoupled surface"));
+    assert!(!driver.has("Decoded surface"));
 }
 
 #[test]
@@ -263,10 +263,10 @@ fn changing_the_settings_hides_old_results_and_changing_them_back_restores_them(
     driver.click("10×8");
     driver.wait("the other array's surface", |driver| driver.state().preview.is_some());
     let networks = driver.table().into_iter().filter(|cell| cell.starts_with("network, "));
-    assert!(networks.into_iter().all(|cell| cell.ends_with('–')) && !driver.has("Decoupled surface"));
+    assert!(networks.into_iter().all(|cell| cell.ends_with('–')) && !driver.has("Decoded surface"));
     driver.click("10×6");
     assert_eq!(driver.table(), table);
-    assert!(driver.has("Decoupled surface"));
+    assert!(driver.has("Decoded surface"));
 
     // Faster than the worker draws the other array.
     assert!(driver.becomes_idle());

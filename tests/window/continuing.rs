@@ -120,7 +120,7 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
 fn the_spread_is_shown_while_the_starts_train() {
     let mut driver = Driver::open();
     driver.configure_small();
-    driver.enter("Starts", "3");
+    driver.enter("Restarts", "3");
     choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.enter("Epochs", "1000000");
     driver.click("▶ Train");
@@ -357,7 +357,7 @@ fn a_paused_training_can_be_continued_with_another_method_or_resumed_as_it_was()
     start_endless(&mut driver);
     pause(&mut driver);
     assert!(!driver.has("Continue"), "Resume does that");
-    assert!(!driver.is_enabled("Hidden nodes") && !driver.is_enabled("Starts"));
+    assert!(!driver.is_enabled("Hidden nodes") && !driver.is_enabled("Restarts"));
     choose_method(&mut driver, "Levenberg-Marquardt");
     assert!(driver.has("Continue"));
     driver.click("▶ Resume");
@@ -420,7 +420,7 @@ fn bayesian_regularisation_says_how_many_weights_the_data_determine() {
 #[test]
 fn the_spread_and_continue_fit_in_narrow_windows() {
     let mut driver = Driver::open_sized(vec2(960.0, 640.0));
-    driver.enter("Starts", "3");
+    driver.enter("Restarts", "3");
     driver.enter("Epochs", "1");
     driver.train();
     driver.settle();

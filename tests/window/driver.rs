@@ -42,9 +42,6 @@ const FOLDED: [&str; 7] = [
     "Figures of the paper",
 ];
 
-/// Label of the button that ends the tour.
-pub(crate) const SKIP: &str = "Skip the tour";
-
 /// Label of the button that closes a notice.
 const DISMISS: &str = "Dismiss";
 
@@ -90,22 +87,14 @@ impl Driver {
         Self::open_as(vec2(1440.0, 900.0), None, keeping).on_the_papers_scene()
     }
 
-    /// Opens the window with its state remembered in a file; the tour has ended.
+    /// Opens the window with its state remembered in a file.
     pub(crate) fn open_remembering(path: &Path) -> Self {
-        let mut driver = Self::open_on_tour(path);
-        if driver.has(SKIP) {
-            driver.click(SKIP);
-        }
+        let file = WindowFile::read(path.to_owned());
+        let mut driver = Self::open_as(vec2(1440.0, 900.0), Some(file), |window| window);
         if driver.shown() == "Train" && driver.state().source == SourceKind::Array {
             driver.unfold();
         }
         driver
-    }
-
-    /// Opens the window with its state remembered in a file, and with the tour unless that has ended before.
-    pub(crate) fn open_on_tour(path: &Path) -> Self {
-        let file = WindowFile::read(path.to_owned());
-        Self::open_as(vec2(1440.0, 900.0), Some(file), |window| window)
     }
 
     fn open_as(

@@ -66,7 +66,7 @@ fn a_large_array_trains() {
     drawn(&mut driver);
     assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 1600);
     assert_eq!(try_training(&mut driver), None);
-    assert!(driver.has("Decoupled surface"));
+    assert!(driver.has("Decoded surface"));
     driver.click_button("Top view");
     driver.settle();
     shows_no_infinities(&driver);
@@ -84,7 +84,7 @@ fn one_sample_of_everything_trains_or_says_why_not() {
             driver.enter("Epochs", "5");
             drawn(&mut driver);
             match try_training(&mut driver) {
-                None => assert!(driver.has("Decoupled surface"), "{array}"),
+                None => assert!(driver.has("Decoded surface"), "{array}"),
                 Some(reason) => {
                     let expected = "every target is constant in the training set: there is nothing to learn";
                     assert!(array == "1x1_1x3" && reason.starts_with(expected), "{array}: {reason}");
@@ -126,7 +126,7 @@ fn extreme_resistivities_and_geometries_train_or_say_why_not() {
         if let Some(reason) = try_training(&mut driver) {
             assert!(reason.contains(' ') && driver.says(&reason), "{changes:?}: {reason}");
         } else {
-            assert!(driver.has("Decoupled surface"), "{changes:?}");
+            assert!(driver.has("Decoded surface"), "{changes:?}");
             driver.click_button("Error");
         }
         shows_no_infinities(&driver);

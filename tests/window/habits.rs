@@ -92,7 +92,7 @@ fn while_the_list_is_open_other_keys_do_nothing() {
 fn every_listed_key_works() {
     let mut driver = Driver::open();
     driver.press(Key::Questionmark);
-    assert!(driver.says("Ctrl+K") && driver.says("Next test snapshot") && driver.says("PageDown"));
+    assert!(driver.says("Ctrl+K") && driver.says("Next test sample") && driver.says("PageDown"));
     driver.press(Key::Escape);
     assert!(!driver.says("PageDown"));
     driver.press_with(Modifiers::COMMAND, Key::Num2);

@@ -178,7 +178,7 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     without.settle();
     assert_eq!(without.state().settings().hidden, 4);
     assert!(without.state().setup().unwrap_err().contains("press.csv is missing"));
-    type_path(&mut without, "Type the path of press.csv", &moved);
+    type_path(&mut without, "Find press.csv", &moved);
     without.wait("the samples", |driver| driver.has("Training: 48"));
     assert!(!without.says("is missing") && !without.says("has changed since"));
     assert_eq!(without.state().setup().unwrap().plan().unwrap().import.data, moved);
@@ -198,7 +198,7 @@ fn a_changed_recording_is_reported() {
     let mut other = Driver::open();
     other.drop_files(&[&network]);
     other.wait("what is missing", |driver| driver.has("press.csv is missing."));
-    type_path(&mut other, "Type the path of press.csv", &changed);
+    type_path(&mut other, "Find press.csv", &changed);
     other.wait("the samples", |driver| driver.has("Training: 40"));
     assert!(other.has("changed.csv has changed since the run was saved."));
 
@@ -206,14 +206,14 @@ fn a_changed_recording_is_reported() {
     let mut resumed = Driver::open();
     resumed.drop_files(&[&checkpoint]);
     resumed.wait("what is missing", |driver| driver.has("press.csv is missing."));
-    type_path(&mut resumed, "Type the path of press.csv", &changed);
+    type_path(&mut resumed, "Find press.csv", &changed);
     resumed.wait("the reason", |driver| {
         driver.says("changed.csv has changed since the training was saved")
     });
     assert!(resumed.has("press.csv is missing.") && resumed.state().run.is_none());
     // With the right file, which is elsewhere, it continues where it stopped.
     let found = written(&folder, "found.csv", &recording(60));
-    type_path(&mut resumed, "Type the path of press.csv", &found);
+    type_path(&mut resumed, "Find press.csv", &found);
     resumed.wait("the training", |driver| driver.state().result().is_some());
     resumed.settle();
     assert_eq!(resumed.state().result().unwrap().epochs_run, 2);

@@ -119,11 +119,11 @@ fn compare_view_with_two_runs() {
 }
 
 #[test]
-fn identifiability_view() {
+fn sensor_view() {
     let mut driver = open_view("Sensor");
     driver.wait("the answer", |driver| driver.says("Condition number: "));
     driver.settle();
-    looks_as_before(&mut driver, "identifiability");
+    looks_as_before(&mut driver, "sensor");
 }
 
 #[test]

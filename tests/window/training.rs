@@ -71,19 +71,19 @@ fn every_picture_of_a_trained_network_can_be_displayed() {
     }
     driver.configure_small();
     driver.train();
-    let heights = driver.get("Decoupled surface").value().unwrap();
+    let heights = driver.get("Decoded surface").value().unwrap();
     assert!(heights.starts_with("z ") && heights.ends_with(" mm"), "{heights}");
 
     driver.click_button("Error");
     let error = driver.get("Error surface").value().unwrap();
     assert!(error.starts_with("error ") && error.ends_with(" mm"), "{error}");
-    assert!(!driver.has("Decoupled surface"));
-    driver.click_button("Decoupled");
-    assert!(driver.has("Decoupled surface"));
+    assert!(!driver.has("Decoded surface"));
+    driver.click_button("Decoded");
+    assert!(driver.has("Decoded surface"));
 
     driver.click_button("Top view");
     assert_eq!(driver.state().look.mode, ViewMode::Top);
-    assert!(driver.has("Actual surface") && driver.has("Decoupled surface"));
+    assert!(driver.has("Actual surface") && driver.has("Decoded surface"));
     driver.click_button("3-D");
     assert_eq!(driver.state().look.mode, ViewMode::ThreeD);
 
@@ -170,7 +170,7 @@ fn a_paused_training_is_idle_and_resumes_as_if_it_had_never_been_paused() {
     }
     assert_eq!(driver.state().run.as_ref().unwrap().history, run.leader().history());
     assert_eq!(driver.table(), table_of(&run));
-    assert!(driver.has("Decoupled surface") && driver.is_enabled("Hidden nodes"));
+    assert!(driver.has("Decoded surface") && driver.is_enabled("Hidden nodes"));
     driver.settle();
 }
 

@@ -13,7 +13,7 @@ use crate::window::{
         Effect, FileInUse, FileTask, Look, Matter, Phase, Purpose, RecordingDraft, RunView, SourceKind, ViewKind,
     },
     theme,
-    training_worker::{Inspection, LOST, Request, TrainedRun},
+    training_worker::{Inspection, LOST, Origin, Request, TrainedRun},
     views::CHECKPOINT,
 };
 use decoupler_core::{dataset::Simulation, evaluation::RunSettings};
@@ -43,23 +43,19 @@ impl DecouplerWindow {
             Effect::ChooseSource(_) => {}
             Effect::TakeSetup(setup) => self.take_setup(&setup),
             Effect::ShowTraining => self.show(ViewKind::Train),
-            Effect::Train => {
-                self.opened = None;
-                match shared.setup() {
-                    Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
-                        self.prepare(Request::Choose(Box::new(setup)));
-                    }
-                    Ok(setup) => self.prepare(Request::Train(Box::new(setup))),
-                    Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
+            Effect::Train => match shared.setup() {
+                Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
+                    self.begin(Origin::Chosen(Box::new(setup)));
                 }
-            }
+                Ok(setup) => self.begin(Origin::New(Box::new(setup))),
+                Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
+            },
             // A training may have begun in the same frame.
             Effect::OpenTraining(_) | Effect::TakeUp(..) if shared.phase.is_busy() => {}
-            Effect::OpenTraining(path) => self.open_training(path),
+            Effect::OpenTraining(path) => self.begin(Origin::File(path)),
             Effect::TakeUp(setup, states) => {
-                self.opened = None;
                 self.take_setup(&setup);
-                self.prepare(Request::TakeUp(setup, states));
+                self.begin(Origin::States(setup, states));
             }
             Effect::Pause => {
                 shared.phase = Phase::Paused;
@@ -109,11 +105,15 @@ impl DecouplerWindow {
     }
 
     /// Requests a training that replaces the displayed one.
-    fn prepare(&mut self, request: Request) {
+    pub(super) fn begin(&mut self, origin: Origin) {
+        self.opened = match &origin {
+            Origin::File(path) => Some(path.clone()),
+            _ => None,
+        };
         self.shared.phase = Phase::Preparing;
         self.notices.settle(Matter::Training);
         self.notices.settle(Matter::Settings);
-        self.worker.ask(request);
+        self.worker.begin(origin);
     }
 
     /// Chooses settings automatically from now on, or begins with those that were chosen.
@@ -129,19 +129,6 @@ impl DecouplerWindow {
             }
             self.share_plan();
         }
-    }
-
-    /// Opens the training saved in this checkpoint.
-    fn open_training(&mut self, path: PathBuf) {
-        self.opened = Some(path.clone());
-        self.prepare(Request::Open(path));
-    }
-
-    /// Resumes the training that was cut short.
-    pub(super) fn resume_cut_short(&mut self) {
-        self.opened = None;
-        self.notices.settle(Matter::CutShort);
-        self.prepare(Request::ResumeLeft);
     }
 
     /// Shows a view.
@@ -234,7 +221,7 @@ impl DecouplerWindow {
             }
             // A training may have begun while the desktop's dialog was open.
             Purpose::Open if self.shared.phase.is_busy() => {}
-            Purpose::Open => self.open_training(path),
+            Purpose::Open => self.begin(Origin::File(path)),
         }
     }
 

@@ -23,6 +23,8 @@ pub(super) struct Closing {
     can_save: bool,
     /// True once the user has decided to close: the window waits only for files that are being written.
     is_decided: bool,
+    /// True if it does not even wait for these.
+    is_forced: bool,
     /// Saves the running training for the next start, if the user has asked for that.
     saving: Option<Background<()>>,
 }
@@ -38,6 +40,7 @@ impl DecouplerWindow {
                 can_save: self.keeping.is_some() && is_trained && unfinished_training(&self.shared).is_some(),
                 // Files alone need no question: the window shows that it waits for them.
                 is_decided: lines.is_empty(),
+                is_forced: false,
                 lines,
                 saving: None,
             }));
@@ -49,7 +52,8 @@ impl DecouplerWindow {
             saving.next_event();
             !saving.is_under_way()
         });
-        let may_close = closing.is_decided && is_saved && self.files.paths().next().is_none();
+        let has_files = !is_saved || self.files.paths().next().is_some();
+        let may_close = closing.is_decided && (!has_files || closing.is_forced);
         match (is_requested, may_close) {
             (true, true) if closing.saving.is_some() => {}
             (true, true) => self.worker.forget(),
@@ -66,6 +70,7 @@ impl DecouplerWindow {
     /// Closes the window once the files are written, that of the running training among them if it is to be kept.
     pub(super) fn leave(&mut self, keeps_training: bool) {
         if let Some(Modal::Closing(closing)) = &mut self.modal {
+            closing.is_forced = closing.is_decided;
             closing.is_decided = true;
             if keeps_training {
                 let save = self.worker.saver();
@@ -147,7 +152,12 @@ pub(super) fn closing_ui(
                     reply = Some(Reply::Leave { keeps_training: true });
                 }
             }
-            if !closing.is_decided && ui.add(ghost_button("Close")).clicked() {
+            let name = if closing.is_decided {
+                "Close without them"
+            } else {
+                "Close"
+            };
+            if ui.add(ghost_button(name)).clicked() {
                 reply = Some(Reply::Leave { keeps_training: false });
             }
             if ui.add(ghost_button("Cancel")).clicked() {

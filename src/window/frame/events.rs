@@ -9,7 +9,7 @@ use crate::window::{
     job::JobError,
     preview::PreviewEvent,
     shared::{Matter, Notice, Phase, Preview, RunView, ViewKind},
-    training_worker::{Began, Event},
+    training_worker::{Began, Event, Start},
 };
 use decoupler_core::evaluation::RunSettings;
 
@@ -100,19 +100,24 @@ impl DecouplerWindow {
         }
     }
 
-    /// Shows a training restored from a checkpoint. If it has ended, its next event says so.
-    fn take_opened(&mut self, began: Began, phase: Phase) {
+    /// Shows a training that has begun. If one from a checkpoint has ended, its next event says so.
+    fn take_begun(&mut self, began: Began, start: Start) {
         let setup = began.setup.clone();
         self.shared.preview = None;
         self.shared.run = Some(RunView {
             // The checkpoint of one that was cut short is removed when the window closes.
-            is_saved: phase == Phase::Paused,
+            is_saved: start == Start::Paused,
             ..RunView::new(began)
         });
-        self.take_setup(&setup);
+        if start != Start::New {
+            self.take_setup(&setup);
+            self.typed = None;
+        }
         self.share_plan();
-        self.typed = None;
-        self.shared.phase = phase;
+        self.shared.phase = match start {
+            Start::Paused => Phase::Paused,
+            Start::New | Start::Resumed => Phase::Training,
+        };
     }
 
     /// Shares the plan on the left with the training, if they have the same.
@@ -131,16 +136,18 @@ impl DecouplerWindow {
             shared.choosing = None;
         }
         match event {
-            Event::Began(Ok(began)) => {
-                shared.preview = None;
-                let run = shared.run.insert(RunView::new(*began));
-                run.share_plan(&shared.recording);
-                shared.phase = Phase::Training;
+            Event::Began(_, start, Ok(began)) => self.take_begun(*began, start),
+            Event::Began(_, start, Err(reason)) => {
+                let matter = if start == Start::New {
+                    Matter::Settings
+                } else {
+                    Matter::Training
+                };
+                self.refuse(matter, reason);
+                if let Some(path) = self.opened.clone() {
+                    self.views.look_for_recordings(path);
+                }
             }
-            Event::Began(Err(error)) => self.refuse(Matter::Settings, error.to_string()),
-            Event::Opened(Ok(began)) => self.take_opened(*began, Phase::Paused),
-            Event::Resumed(Ok(began)) => self.take_opened(*began, Phase::Training),
-            Event::Resumed(Err(reason)) => self.refuse(Matter::Training, reason),
             Event::Left(question) => {
                 self.notices.settle(Matter::CutShort);
                 if let Some(question) = question {
@@ -150,12 +157,6 @@ impl DecouplerWindow {
             Event::Unkept(reason) => {
                 let text = format!("A running training will be lost if the program ends: {reason}");
                 self.notices.fail(Matter::Memory, text);
-            }
-            Event::Opened(Err(reason)) => {
-                self.refuse(Matter::Training, reason);
-                if let Some(path) = self.opened.clone() {
-                    self.views.look_for_recordings(path);
-                }
             }
             Event::Continued(Ok(settings)) => {
                 // Settings that were chosen were not asked for.
@@ -204,8 +205,6 @@ impl DecouplerWindow {
                 let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");
                 self.notices.fail(Matter::Training, text);
             }
-            // The worker does not pass these on.
-            Event::Abandoned => {}
         }
         if self.worker.is_preparing() {
             // The event belongs to the previous training.

@@ -6,7 +6,7 @@ use super::{DecouplerWindow, files::open_folder};
 use crate::window::{
     shared::{Effect, Matter, Notice, Phase},
     theme::{Theme, space},
-    training_worker::Request,
+    training_worker::{Origin, Request},
 };
 
 /// Maximum number of notices shown at a time: they cover a part of the view.
@@ -152,8 +152,11 @@ impl DecouplerWindow {
                 }
             }
             Reply::Restart => self.restart_worker(),
-            Reply::Reconnect => self.views.live.retry(&self.shared, effects),
-            Reply::Resume => self.resume_cut_short(),
+            Reply::Reconnect => self.views.live.start(&self.shared, effects),
+            Reply::Resume => {
+                self.notices.settle(Matter::CutShort);
+                self.begin(Origin::Left);
+            }
             Reply::Discard => {
                 self.notices.settle(Matter::CutShort);
                 self.worker.ask(Request::DiscardLeft);

@@ -23,8 +23,6 @@ pub enum Command {
     PreviousSection,
     SectionAlongColumns,
     SectionAlongRows,
-    NextBar,
-    PreviousBar,
     // Of other views, which name their work: "Run experiment".
     Begin(&'static str),
     Cancel(&'static str),
@@ -91,8 +89,6 @@ impl Command {
             Self::PreviousSection => ("Previous section", Some((PLAIN, Key::OpenBracket)), ""),
             Self::SectionAlongColumns => ("Section along a column-wire", Some((PLAIN, Key::Backslash)), ""),
             Self::SectionAlongRows => ("Section along a row-wire", Some((PLAIN, Key::Backslash)), ""),
-            Self::NextBar => ("Next bar of the histogram", Some((PLAIN, Key::CloseBracket)), ""),
-            Self::PreviousBar => ("Previous bar of the histogram", Some((PLAIN, Key::OpenBracket)), ""),
             Self::Begin(name) => (*name, Some((COMMAND, Key::Enter)), "Start."),
             Self::Cancel(name) => (*name, Some((COMMAND, Key::Period)), "Stop; what has finished is kept."),
             Self::CrossValidate => ("Cross-validate", None, "Test on every part of the samples in turn."),

@@ -4,6 +4,7 @@
 mod command;
 mod error_table;
 mod export;
+mod look;
 mod offers;
 mod run_list;
 mod run_view;
@@ -17,10 +18,10 @@ pub use error_table::error_table_ui;
 pub use export::{
     ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, file_stem, saying_saved,
 };
+pub use look::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 pub use offers::{FileInUse, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
 pub use run_view::{RunView, run_buttons_ui, sentence, training_status};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
-pub use training_form::{Effect, Matter, Notice, combination_name, method_choice_ui, method_settings_ui, stopping_ui};
+pub use training_form::{Effect, Matter, Notice};
 pub use view::{Columns, Holdings, MIN_WIDTH_FOR_REPORT, Status, Tone, Unfinished, View, ViewKind};
-pub use view::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};

@@ -26,23 +26,17 @@ use decoupler_files::{
 };
 use ndarray::Array2;
 
-use super::{calibration::Calibration, keeping::Kept, past_networks::PastNetworks, training_loop::TrainingLoop};
+use super::{calibration::Calibration, keeping::Keeping, past_networks::PastNetworks, training_loop::TrainingLoop};
 use crate::window::{
     job::{Background, JobError, Wake},
-    test_view::{Frame, TargetCharts, TestSet, TestViewError},
+    test_view::{Frame, TargetCharts, TestSet},
 };
 
 /// Request from the window to the worker.
 #[derive(Debug)]
 pub enum Request {
-    /// Start a training; one in progress is discarded.
-    Train(Box<Setup>),
-    /// Choose the settings for this recording, and start a training with them; one in progress is discarded.
-    Choose(Box<Setup>),
-    /// Load the training saved in this file and pause it; one in progress is discarded.
-    Open(PathBuf),
-    /// Restore the training with these states of its starts and pause it; one in progress is discarded.
-    TakeUp(Box<Setup>, Vec<TrainerState>),
+    /// Begin a training; one in progress is discarded.
+    Begin(RunId, Origin),
     /// Continue from the current weights with this method and this many additional epochs.
     Continue(TrainingSettings),
     /// Pause.
@@ -55,29 +49,47 @@ pub enum Request {
     Inspect(RunId, Inspection),
     /// Keep checkpoints of running trainings in this folder from now on, saved at this interval.
     Keep(PathBuf, Duration),
-    /// Resume the training that was offered.
-    ResumeLeft,
     /// Remove the checkpoint that was offered.
     DiscardLeft,
     /// Save the checkpoint of the running training now, and answer.
     Save(Sender<()>),
 }
 
+/// What a training begins with.
+#[derive(Debug)]
+pub enum Origin {
+    /// New networks with these settings.
+    New(Box<Setup>),
+    /// New networks with settings that are chosen for this recording.
+    Chosen(Box<Setup>),
+    /// These states of its starts; it is paused.
+    States(Box<Setup>, Vec<TrainerState>),
+    /// A checkpoint; it is paused.
+    File(PathBuf),
+    /// The training that was cut short and is offered.
+    Left,
+}
+
+/// How a training begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// With new networks.
+    New,
+    /// From a checkpoint or states, paused.
+    Paused,
+    /// From the checkpoint of a training that was cut short.
+    Resumed,
+}
+
 /// Message from the worker to the window.
 #[derive(Debug)]
 pub enum Event {
     /// A training has begun, or an error.
-    Began(Result<Box<Began>, TestViewError>),
-    /// A saved training has been restored, or an error.
-    Opened(Result<Box<Began>, String>),
-    /// A training that was cut short continues, or an error.
-    Resumed(Result<Box<Began>, String>),
+    Began(RunId, Start, Result<Box<Began>, String>),
     /// Question about a training that was cut short, if there is one.
     Left(Option<String>),
     /// The running training cannot be kept, with the reason.
     Unkept(String),
-    /// A training was cancelled during its preparation.
-    Abandoned,
     /// The training continues with these settings, or an error.
     Continued(Result<Box<RunSettings>, String>),
     /// Progress of reading a recording before a training.
@@ -131,12 +143,12 @@ impl fmt::Debug for Inspection {
 
 /// Identity of a training, unique also across workers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RunId(u64);
+pub struct RunId(pub(super) u64);
 
 impl RunId {
     /// Returns a new, unique identity.
     pub fn new() -> Self {
-        static BEGUN: AtomicU64 = AtomicU64::new(0);
+        static BEGUN: AtomicU64 = AtomicU64::new(1);
         Self(BEGUN.fetch_add(1, Ordering::Relaxed))
     }
 }
@@ -269,37 +281,38 @@ pub struct Worker {
     job: Background<Event>,
     /// Shared with the thread that waits for signals.
     requests: Arc<Mutex<Sender<Request>>>,
-    kept: Kept,
-    /// Numbers of requested and finished preparations of trainings.
-    requested: Cell<u64>,
-    finished: Cell<u64>,
-    /// Number of the last cancelled preparation; all earlier ones are cancelled, too.
-    cancelled: Arc<AtomicU64>,
+    keeping: Keeping,
+    /// The training that is being prepared.
+    awaited: Cell<Option<RunId>>,
+    watched: Arc<Watched>,
+}
+
+/// What the window tells the worker in the middle of its work.
+#[derive(Debug, Default)]
+pub(super) struct Watched {
+    /// Number of the training last asked for: the preparations of others are cancelled.
+    pub(super) newest: AtomicU64,
     /// Displayed snapshot.
-    snapshot: Arc<AtomicUsize>,
+    pub(super) snapshot: AtomicUsize,
 }
 
 impl Worker {
     /// Starts the thread; `wake` is called after each event.
     pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
-        let cancelled = Arc::<AtomicU64>::default();
         let mut job = Background::new("training", wake);
-        let snapshot = Arc::<AtomicUsize>::default();
-        let kept = Kept::default();
-        let (in_thread, shown, keeps) = (Arc::clone(&cancelled), Arc::clone(&snapshot), kept.clone());
+        let (watched, keeping) = (Arc::<Watched>::default(), Keeping::default());
+        let (in_thread, keeps) = (Arc::clone(&watched), keeping.clone());
         job.start(
-            move |report| TrainingLoop::new(report, &in_thread, &shown, keeps).run(&incoming),
+            move |report| TrainingLoop::new(report, &in_thread, keeps).run(&incoming),
             |ended| Event::Died(ended.err()),
         );
         Self {
             requests: Arc::new(Mutex::new(requests)),
             job,
-            kept,
-            requested: Cell::default(),
-            finished: Cell::default(),
-            cancelled,
-            snapshot,
+            keeping,
+            awaited: Cell::default(),
+            watched,
         }
     }
 
@@ -326,7 +339,7 @@ impl Worker {
 
     /// Removes the checkpoint of the running training, which the user leaves unfinished, and keeps none from now on.
     pub fn forget(&self) {
-        self.kept.forget();
+        self.keeping.forget();
     }
 
     /// Returns a function that saves the running training and waits until it is saved.
@@ -336,24 +349,27 @@ impl Worker {
         let requests = Arc::clone(&self.requests);
         move || {
             let (done, saved) = channel();
+            let requests = requests.lock().unwrap_or_else(PoisonError::into_inner);
             // If the thread has died, there is nothing to save.
-            let _ = requests
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .send(Request::Save(done));
+            let _ = requests.send(Request::Save(done));
+            drop(requests);
             let _ = saved.recv_timeout(LONGEST_SAVE);
         }
+    }
+
+    /// Begins a training. Others that are being prepared are cancelled.
+    pub fn begin(&self, origin: Origin) {
+        let id = RunId::new();
+        self.awaited.set(Some(id));
+        self.watched.newest.store(id.0, Ordering::Relaxed);
+        self.ask(Request::Begin(id, origin));
     }
 
     /// Sends a request. Stopping also cancels a training that is being prepared. If the worker has died,
     /// [`Self::next_event`] reports it.
     pub fn ask(&self, request: Request) {
-        match request {
-            Request::Train(_) | Request::Choose(_) | Request::Open(_) | Request::TakeUp(..) | Request::ResumeLeft => {
-                self.requested.set(self.requested.get() + 1);
-            }
-            Request::Stop => self.cancelled.store(self.requested.get(), Ordering::Relaxed),
-            _ => {}
+        if matches!(request, Request::Stop) && self.awaited.take().is_some() {
+            self.watched.newest.store(RunId::new().0, Ordering::Relaxed);
         }
         // The receiver is dropped only if the worker died.
         let _ = self.requests().send(request);
@@ -361,27 +377,26 @@ impl Worker {
 
     /// Selects the snapshot whose surface is part of later results.
     pub fn watch(&self, snapshot: usize) {
-        self.snapshot.store(snapshot, Ordering::Relaxed);
+        self.watched.snapshot.store(snapshot, Ordering::Relaxed);
     }
 
     /// Returns true while a training is being prepared and not cancelled.
     pub fn is_preparing(&self) -> bool {
-        self.requested.get() > self.finished.get().max(self.cancelled.load(Ordering::Relaxed))
+        self.awaited.get().is_some()
     }
 
     /// Returns the next event, if one has arrived.
     pub fn next_event(&self) -> Option<Event> {
         loop {
-            let event = self.job.next_event()?;
-            if let Event::Began(_) | Event::Opened(_) | Event::Resumed(_) | Event::Abandoned = event {
-                self.finished.set(self.finished.get() + 1);
-            }
-            let is_cancelled = self.finished.get() <= self.cancelled.load(Ordering::Relaxed);
-            match event {
-                Event::Abandoned => {}
+            match self.job.next_event()? {
                 // Errors of a cancelled preparation are ignored.
-                Event::Began(Err(_)) | Event::Opened(Err(_)) | Event::Resumed(Err(_)) if is_cancelled => {}
-                event => return Some(event),
+                Event::Began(id, _, Err(_)) if self.awaited.get() != Some(id) => {}
+                event => {
+                    if matches!(event, Event::Began(id, ..) if self.awaited.get() == Some(id)) {
+                        self.awaited.set(None);
+                    }
+                    return Some(event);
+                }
             }
         }
     }

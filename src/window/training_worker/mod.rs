@@ -7,6 +7,8 @@ mod message;
 mod past_networks;
 mod training_loop;
 
-pub use message::{Began, Event, Inspection, Progress, Request, RunId, RunResult, TrainedRun, Worker, append_epochs};
+pub use message::{
+    Began, Event, Inspection, Origin, Progress, Request, RunId, RunResult, Start, TrainedRun, Worker, append_epochs,
+};
 pub use past_networks::PastNetworks;
 pub use training_loop::LOST;

@@ -4,8 +4,8 @@
 //! below. It requests changes to the window as an [`Effect`](crate::window::shared::Effect), which the frame applies.
 
 mod compare;
-mod identifiability;
 mod live;
+mod sensor;
 mod study;
 mod train;
 
@@ -17,13 +17,10 @@ use super::{
 };
 use decoupler_files::import::Plan;
 
-pub use identifiability::{Analysis, Question};
 pub(super) use train::CHECKPOINT;
-pub use train::{BottomTab, DecoderResult, Touch};
+pub use train::DecoderResult;
 
-use self::{
-    compare::CompareView, identifiability::IdentifiabilityView, live::LiveView, study::StudyView, train::TrainView,
-};
+use self::{compare::CompareView, live::LiveView, sensor::SensorView, study::StudyView, train::TrainView};
 
 /// All views.
 #[derive(Debug)]
@@ -35,7 +32,7 @@ pub struct Views {
     /// Two finished trainings side by side.
     pub compare: CompareView,
     /// What the readings determine.
-    pub identifiability: IdentifiabilityView,
+    pub sensor: SensorView,
     /// Frames decoded as they arrive.
     pub live: LiveView,
 }
@@ -47,7 +44,7 @@ impl Views {
             train: TrainView::new(Arc::clone(wake)),
             study: StudyView::new(Arc::clone(wake)),
             compare: CompareView::new(Arc::clone(wake)),
-            identifiability: IdentifiabilityView::new(Arc::clone(wake)),
+            sensor: SensorView::new(Arc::clone(wake)),
             live: LiveView::new(Arc::clone(wake)),
         }
     }
@@ -78,7 +75,7 @@ impl Views {
             ViewKind::Train => &mut self.train,
             ViewKind::Study => &mut self.study,
             ViewKind::Compare => &mut self.compare,
-            ViewKind::Sensor => &mut self.identifiability,
+            ViewKind::Sensor => &mut self.sensor,
             ViewKind::Live => &mut self.live,
         }
     }

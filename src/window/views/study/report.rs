@@ -191,7 +191,6 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<Wish> {
             look.sort = sort;
             return None;
         }
-        TableClick::Point(_) => return None,
     };
     look.marked = Some(page.rows[order[place]].item);
     wish

@@ -14,7 +14,7 @@ use crate::window::{
     shared::{Effect, FileTask, FileWords, Shared, Shown},
     theme::{semibold, space, type_size},
     widgets::{
-        card_ui, dim_ui, ghost_button, invitation_ui, note_ui, primary_button, progress_bar_ui, scrolled_ui,
+        card_ui, dim_ui, ghost_button, invitation_ui, note_ui, primary_button_of, progress_bar_ui, scrolled_ui,
         section_heading_ui, segmented_ui, with_shortcut,
     },
 };
@@ -73,7 +73,7 @@ fn buttons_ui(ui: &mut Ui, view: &mut StudyView, verb: &str, effects: &mut Vec<E
     let half = ((ui.available_width() - space(2)) / 2.0).floor();
     ui.horizontal(|ui| {
         let size = vec2(half, space(7));
-        let begin = primary_button(format!("▶ {verb}")).min_size(size);
+        let begin = primary_button_of(format!("▶ {verb}"), size);
         let begin = ui.add_enabled(view.can_begin(), begin);
         let why_not = match &view.running {
             Some(running) => format!("{} is under way", running.topic.name()),

@@ -7,12 +7,12 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{decoder_table, error_table, loss_table},
-    figure::{Figure, surface::ViewMode},
+    figure::surface::ViewMode,
 };
 
 use super::{
-    charts_card::{BottomTab, all_targets_figure, chart, has_target_surface},
-    surfaces::surface_figure,
+    charts::{NODES, has_target_surface, shown_chart},
+    surfaces::upper_figure,
     view::TrainView,
 };
 use crate::window::{
@@ -75,11 +75,16 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     };
     let surfaces = run.clone().map(|_| || upper_figure(view, shared));
     shown.push(Shown::figure(name, stem(what), surfaces));
-    let chart = run.clone().and_then(|_| {
-        let figure = Figure::from(chart(view, shared).ok_or("This chart has nothing to show yet.")?);
+    let (chart, figure) = shown_chart(view, shared);
+    let figure = run.clone().and_then(|_| {
+        let figure = figure.ok_or("This chart has nothing to show yet.")?;
         Ok(move || figure.clone())
     });
-    shown.push(Shown::figure("Chart", stem(view.tab.file_word()), chart));
+    shown.push(Shown::figure(
+        "Chart",
+        stem(&chart.to_lowercase().replace(' ', "-")),
+        figure,
+    ));
     let errors = trained.map(|(run, latest)| {
         let result = view.result(shared).unwrap_or(latest);
         move || error_table(&run.error_table(result))
@@ -103,15 +108,6 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     });
     shown.push(Shown::file("Checkpoint", standing));
     shown
-}
-
-/// Returns the figure above the charts: the surfaces, or all targets of a sample.
-fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
-    let surfaces = surface_figure(view, shared);
-    match all_targets_figure(view, shared) {
-        Some(targets) if surfaces.surfaces.is_empty() => targets.into(),
-        _ => surfaces.into(),
-    }
 }
 
 /// Returns the best network, and before it that of the `past` epoch while it is displayed.
@@ -217,7 +213,7 @@ impl PaperFigure {
     }
 
     /// Returns its chart; `None` if it shows none.
-    pub fn tab(self) -> Option<BottomTab> {
-        (self == Self::Six).then_some(BottomTab::Nodes)
+    pub fn tab(self) -> Option<&'static str> {
+        (self == Self::Six).then_some(NODES.name)
     }
 }

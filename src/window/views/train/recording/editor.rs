@@ -1,19 +1,22 @@
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
     sync::{
         Arc,
-        mpsc::{Receiver, Sender, channel},
+        mpsc::{Receiver, channel},
     },
 };
 
 use super::{
-    draft::{Draft, file_name},
-    files_section::Reopened,
-    opening::{Checking, Files, Opened, Opening, ToOpen},
+    checking::Checking,
+    files_section::FILES,
+    import::{Import, file_name},
+    opening::{Files, Opened, Opening, Reopened, ToOpen},
+    options::Typed,
 };
 use crate::window::{
     job::Wake,
-    shared::{Effect, FileInUse, FileTask, FileWords, Matter, Notice, RecordingDraft, Shared, SourceKind},
+    shared::{Effect, FileInUse, FileTask, FileWords, Matter, Notice, Purpose, RecordingDraft, Shared, SourceKind},
     training_worker::RunId,
 };
 use decoupler_core::{
@@ -21,7 +24,7 @@ use decoupler_core::{
     scene::RowModel,
 };
 use decoupler_files::{
-    export::{NetworkFile, RunSummary},
+    export::RunSummary,
     import::{Meaning, Plan, Setup},
 };
 
@@ -31,96 +34,99 @@ use decoupler_files::{
 #[derive(Debug)]
 pub struct RecordingEditor {
     /// The import, once files are open.
-    pub(super) draft: Option<Draft>,
-    /// An import with missing files.
+    pub(super) import: Option<Import>,
+    /// A plan with missing files.
     pub(super) missing: Option<Box<Reopened>>,
     /// Names of files that have changed since the run with this import.
     pub(super) changed: Vec<String>,
     pub(super) opening: Opening,
     pub(super) checking: Checking,
-    /// Paths of recordings that the user chooses, in dialogs or by typing.
-    pub(super) recordings: ChosenPaths,
-    /// Paths of files of test samples.
-    pub(super) tests: ChosenPaths,
-    /// Paths of files with positions of targets.
-    pub(super) positions: ChosenPaths,
-    /// Missing file to be found, and the path that the user chooses.
-    pub(super) finding: Option<(PathBuf, ChosenPaths)>,
+    /// Texts in the fields of options that are not in the plan yet, by the names of the options.
+    pub(super) typed: BTreeMap<&'static str, Typed>,
     /// True if the user is viewing the columns while there is a run to show.
     pub(super) shows_columns: bool,
+    /// The file asked for last, and where its path arrives.
+    asked: Option<(Use, Receiver<PathBuf>)>,
+    /// File and name of a variable whose rows become the samples, and the meaning of its columns.
+    variable: Option<(usize, String, Meaning)>,
+    /// A checkpoint that the worker could not resume.
+    refused: Option<PathBuf>,
     /// The run that the window knew last.
     run: Option<RunId>,
     /// Share held out for validation that the method needs; `None` if the share of a plan is to be kept.
     held_out: Option<f64>,
 }
 
-/// Paths that the user chooses for one purpose.
-#[derive(Debug)]
-pub(super) struct ChosenPaths {
-    sender: Sender<PathBuf>,
-    receiver: Receiver<PathBuf>,
-}
-
-impl Default for ChosenPaths {
-    fn default() -> Self {
-        let (sender, receiver) = channel();
-        Self { sender, receiver }
-    }
-}
-
-impl ChosenPaths {
-    /// Returns the task of asking for a path.
-    pub(super) fn task(&self, words: FileWords, suggestion: String) -> FileTask {
-        FileTask::choose(words, suggestion, self.sender.clone())
-    }
-
-    fn take(&self) -> Vec<PathBuf> {
-        self.receiver.try_iter().collect()
-    }
+/// Use of a file that the user is asked for.
+#[derive(Clone, Debug)]
+pub(super) enum Use {
+    /// A recording, or another file to be opened.
+    Recording,
+    /// Takes the place of this missing file.
+    Missing(PathBuf),
+    /// A recording of test samples.
+    Test,
+    /// Positions of the targets.
+    Positions,
 }
 
 impl RecordingEditor {
     /// Nothing open yet. `wake` is called when there are events.
     pub fn new(wake: &Wake) -> Self {
         Self {
-            draft: None,
+            import: None,
             missing: None,
             changed: Vec::new(),
             opening: Opening::new(Arc::clone(wake)),
             checking: Checking::new(Arc::clone(wake)),
-            recordings: ChosenPaths::default(),
-            tests: ChosenPaths::default(),
-            positions: ChosenPaths::default(),
-            finding: None,
+            typed: BTreeMap::new(),
             shows_columns: false,
+            asked: None,
+            variable: None,
+            refused: None,
             run: None,
             held_out: None,
         }
     }
 
+    /// Returns the task of opening a file.
+    pub fn open_task(&mut self) -> FileTask {
+        self.ask(Use::Recording, FILES, String::new())
+    }
+
+    /// Returns the task of asking for the path of a file.
+    pub(super) fn ask(&mut self, of: Use, words: FileWords, suggestion: String) -> FileTask {
+        let (sender, receiver) = channel();
+        self.asked = Some((of, receiver));
+        FileTask {
+            words,
+            suggestion,
+            purpose: Purpose::Choose(sender),
+        }
+    }
+
     /// Opens files: recordings are added to those that are open; a recipe, a network or a checkpoint takes their place.
     pub fn open(&mut self, paths: Vec<PathBuf>) {
-        if let (Some(missing), [path]) = (&self.missing, &paths[..]) {
-            let is_it = |missing: &&Path| missing.file_name() == path.file_name();
-            if let Some(found) = missing.missing().into_iter().find(is_it).map(Path::to_owned) {
-                return self.take_found(found, path.clone());
+        let paths = Vec::from_iter(paths.iter().map(|path| absolute(path)));
+        if let (Some(reopened), [path]) = (&self.missing, &paths[..]) {
+            let mut missing = reopened.missing.iter();
+            if let Some(missing) = missing.find(|missing| missing.file_name() == path.file_name()) {
+                let found = Some((missing.clone(), path.clone()));
+                return self.opening.start(ToOpen::Plan(reopened.clone(), found));
             }
         }
-        let open = self.draft.as_ref().map(Draft::paths).unwrap_or_default();
-        self.open_with(paths, open);
+        let open = self.import.as_ref().map(Import::paths).unwrap_or_default();
+        self.open_files(paths, open);
     }
 
     /// Opens the files of `plan`, whose paths are absolute, unless they are open.
     pub fn open_plan(&mut self, plan: &Plan) {
         self.held_out = None;
-        let is_open = self.planned().is_some_and(|planned| *planned == *plan);
-        let is_missing = self
-            .missing
-            .as_ref()
-            .is_some_and(|missing| missing.recorded.plan == *plan);
-        if !is_open && !is_missing {
+        let is_open = self.plan().is_ok_and(|open| *open == *plan);
+        let missing = self.missing.as_ref().map(|missing| &missing.recorded.plan);
+        if !is_open && missing != Some(plan) {
             let reopened = Box::new(Reopened::from(plan.clone()));
-            self.opening.start(ToOpen::Import(reopened));
+            self.opening.start(ToOpen::Plan(reopened, None));
         } else if self.opening.is_reopening {
             self.opening.cancel();
         }
@@ -128,61 +134,68 @@ impl RecordingEditor {
 
     /// Checks the recordings of the checkpoint at `path`, which could not be resumed: they may be missing.
     pub fn look_for_recordings(&mut self, path: PathBuf) {
-        self.opening.start(ToOpen::Missing(path));
+        self.refused = Some(path.clone());
+        self.open(vec![path]);
     }
 
     /// Returns true if no file is open, missing or being opened.
     pub fn is_empty(&self) -> bool {
-        self.draft.is_none() && self.missing.is_none() && self.opening.under_way.is_none()
-    }
-
-    /// Opens the sample recording, which is written into `folder`.
-    pub(super) fn open_sample(&mut self, folder: PathBuf) {
-        self.opening.start(ToOpen::Sample(folder));
-    }
-
-    /// Opens the file at `found` in the place of a missing one.
-    pub(super) fn take_found(&mut self, missing: PathBuf, found: PathBuf) {
-        if let Some(reopened) = self.missing.clone() {
-            self.opening.start(ToOpen::Found(reopened, missing, found));
-        }
+        self.import.is_none() && self.missing.is_none() && self.opening.under_way.is_none()
     }
 
     /// Closes a recording; without the last one there is no import.
-    pub(super) fn close(&mut self, file: usize) {
-        let Some(draft) = &mut self.draft else { return };
-        let mut paths = draft.paths();
-        paths.remove(file);
-        let append = &mut draft.plan.import.append;
-        if file == 0 && !append.is_empty() {
-            paths = append.remove(0).files().cloned().collect();
-        } else if let Some(joined) = file.checked_sub(1) {
-            append.iter_mut().for_each(|set| drop(set.join.remove(joined)));
+    pub(super) fn close(&mut self, number: usize) {
+        let Some(import) = &mut self.import else { return };
+        let plan = import.edit();
+        if number == 0 && !plan.import.append.is_empty() {
+            // The next one takes its place, with the files joined to it.
+            let next = plan.import.append.remove(0);
+            plan.import.data = next.data;
+            for (joined, file) in plan.import.join.iter_mut().zip(next.join) {
+                joined.file = file;
+            }
+            return self.read_again();
         }
+        let mut paths = import.paths();
+        paths.remove(number);
         if paths.is_empty() {
             self.close_all();
         } else {
-            self.open_with(Vec::new(), paths);
+            self.open_files(Vec::new(), paths);
         }
     }
 
     /// Closes all files.
     pub(super) fn close_all(&mut self) {
         self.opening.cancel();
-        (self.draft, self.missing, self.finding) = (None, None, None);
+        (self.import, self.missing) = (None, None);
         self.changed.clear();
+        self.typed.clear();
     }
 
-    /// Reads the files again, with the layout and the missing cells of the draft.
+    /// Reads the files again, in the way that the plan says now.
     pub(super) fn read_again(&mut self) {
-        if let Some(draft) = &self.draft {
-            self.open_with(Vec::new(), draft.paths());
+        if let Some(import) = &self.import {
+            self.open_files(Vec::new(), import.paths());
         }
     }
 
-    fn open_with(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
-        let older = self.draft.clone().map(Box::new);
-        self.opening.start(ToOpen::Files(Files { new, open, older }));
+    /// Makes the rows of a variable the samples, and gives its columns this meaning.
+    pub(super) fn take_variable(&mut self, file: usize, name: String, meaning: Meaning) {
+        self.variable = Some((file, name, meaning));
+        self.read_again();
+    }
+
+    fn open_files(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
+        let older = Box::new(self.import.clone().unwrap_or_default());
+        let used = older.used(self.variable.as_ref().map(|(file, name, _)| (*file, name.as_str())));
+        self.opening.start(ToOpen::Files(Files {
+            new,
+            open,
+            older,
+            used,
+            sample: None,
+        }));
     }
 
     /// Takes events of the threads and paths chosen, and reports the plan if it has changed.
@@ -194,79 +207,74 @@ impl RecordingEditor {
                     effects.push(Effect::Settle(Matter::Recording));
                     self.take(opened, shared, effects);
                 }
-                Err(reason) => effects.push(failed(&reason)),
+                Err(reason) => effects.push(failed(reason)),
             }
+            self.variable = None;
         }
         let run = shared.run.as_ref().map(|run| run.id);
         if run != self.run {
             (self.run, self.shows_columns) = (run, false);
         }
-        self.follow_method(&shared.recording.settings);
+        let settings = &shared.recording.settings;
+        self.follow_method(settings);
         let plan = self.plan();
         // Training needs the processor.
         if !shared.phase.is_busy() {
             if plan.is_ok() {
-                self.follow_row_wires(&shared.recording.settings, effects);
+                self.follow_row_wires(settings, effects);
             }
-            self.checking.follow(plan.clone().ok(), shared.recording.settings.seed);
+            self.checking.follow(plan.clone().ok(), settings.seed);
         }
-        if !self.opening.is_reopening && plan != shared.recording.plan {
+        let is_reported = match (&plan, &shared.recording.plan) {
+            (Ok(plan), Ok(reported)) => Arc::ptr_eq(plan, reported),
+            (Err(reason), Err(reported)) => reason == reported,
+            _ => false,
+        };
+        if !self.opening.is_reopening && !is_reported {
             effects.push(Effect::Import(plan));
         }
     }
 
     fn take_chosen(&mut self, is_busy: bool, effects: &mut Vec<Effect>) {
-        let (recordings, tests) = (self.recordings.take(), self.tests.take());
-        let positions = self.positions.take().pop();
-        let found = self.finding.as_ref();
-        let found = found.and_then(|(missing, paths)| Some((missing.clone(), paths.take().pop()?)));
-        if is_busy {
+        let Some((of, receiver)) = &self.asked else { return };
+        let paths = Vec::from_iter(receiver.try_iter().map(|path| absolute(&path)));
+        let (Some(path), false) = (paths.first().cloned(), is_busy) else {
             return;
-        }
-        if !recordings.is_empty() {
-            self.open(recordings);
-        }
-        if let Some((missing, found)) = found {
-            self.take_found(missing, found);
-        }
-        let Some(draft) = &mut self.draft else { return };
-        let refused = tests.into_iter().filter_map(|path| draft.add_test_file(path).err());
-        effects.extend(refused.map(|reason| failed(&reason)));
-        if positions.is_some() {
-            draft.plan.import.positions = positions;
+        };
+        match (of.clone(), &mut self.import, &self.missing) {
+            (Use::Recording, ..) => self.open(paths),
+            (Use::Missing(missing), _, Some(reopened)) => {
+                self.opening
+                    .start(ToOpen::Plan(reopened.clone(), Some((missing, path))));
+            }
+            (Use::Test, Some(import), _) => {
+                let refused = paths.into_iter().filter_map(|path| import.add_test_file(path).err());
+                effects.extend(refused.map(failed));
+            }
+            (Use::Positions, Some(import), _) => import.edit().import.positions = Some(path),
+            _ => {}
         }
     }
 
     fn take(&mut self, opened: Opened, shared: &Shared, effects: &mut Vec<Effect>) {
+        let usual = shared.recording.settings.validation_fraction();
+        let holding_out = |mut import: Import| {
+            import.edit().division.validation_fraction.get_or_insert(usual);
+            Some(import)
+        };
         match opened {
-            Opened::Recordings(draft) => {
-                let draft = match &self.draft {
-                    Some(older) => draft.keeping(older),
-                    None => draft.holding_out(shared.recording.settings.validation_fraction()),
-                };
-                self.show_import(draft, effects);
+            Opened::Recordings(import) => {
+                let import = import.keeping(self.import.take().unwrap_or_default());
+                (self.import, self.missing) = (holding_out(import), None);
+                self.settle_variable();
+                self.show_columns(effects);
             }
-            Opened::Positions(path) => {
-                if let Some(draft) = &mut self.draft {
-                    draft.plan.import.positions = Some(path);
-                }
-            }
-            Opened::Recipe(draft) => {
-                let usual = shared.recording.settings.validation_fraction();
-                self.show_import(draft.holding_out(usual), effects);
-            }
-            Opened::Simulation(source) => {
-                let settings = RunSettings {
-                    source: (*source).into(),
-                    ..shared.draft
-                };
-                effects.push(Effect::ChooseSource(SourceKind::Array));
-                effects.push(Effect::Configure(Box::new(settings)));
-            }
-            Opened::Import(draft, reopened) => {
+            Opened::Plan(import, reopened) => {
                 self.close_all();
-                self.draft = Some(draft.holding_out(shared.recording.settings.validation_fraction()));
-                self.changed = reopened.changed;
+                (self.import, self.changed) = (holding_out(*import), reopened.changed);
+                if reopened.is_recipe {
+                    self.show_columns(effects);
+                }
                 if let Some(checkpoint) = reopened.checkpoint {
                     let setup = Setup::recording(checkpoint.settings, reopened.recorded.plan);
                     effects.push(Effect::TakeUp(Box::new(setup), checkpoint.starts));
@@ -279,56 +287,68 @@ impl RecordingEditor {
                 }
                 self.missing = Some(reopened);
             }
-            Opened::Network(file, import) => self.take_network(*file, import, shared, effects),
-            Opened::Checkpoint(path) => effects.push(Effect::OpenTraining(path)),
-            Opened::Nothing => {}
+            Opened::Simulation(source) => {
+                let settings = RunSettings {
+                    source: (*source).into(),
+                    ..shared.draft
+                };
+                effects.push(Effect::ChooseSource(SourceKind::Array));
+                effects.push(Effect::Configure(Box::new(settings)));
+            }
+            Opened::Network(file, import) => {
+                let summary = RunSummary::of(&file);
+                let is_listed = shared.runs.workspace.runs.iter().any(|run| *run.summary == summary);
+                match import {
+                    None => effects.push(Effect::TakeSetup(Box::new(file.setup()))),
+                    Some(import) => {
+                        self.held_out = None;
+                        take_settings(file.settings, effects);
+                        match import {
+                            Ok(opened) => self.take(*opened, shared, effects),
+                            Err(reason) => effects.push(failed(reason)),
+                        }
+                    }
+                }
+                let name = file.source_name();
+                let text = format!("The settings of {name} are set. Its run is listed in Compare.");
+                effects.push(Effect::Notify(Matter::Recording, Notice::Done(text)));
+                effects.extend((!is_listed).then(|| Effect::KeepRun(file)));
+            }
+            Opened::Checkpoint(path) => {
+                if self.refused.take().as_ref() != Some(&path) {
+                    effects.push(Effect::OpenTraining(path));
+                }
+            }
+        }
+    }
+
+    /// Gives the columns of the variable that the user chose their meaning.
+    fn settle_variable(&mut self) {
+        let (Some((file, name, meaning)), Some(import)) = (self.variable.take(), &mut self.import) else {
+            return;
+        };
+        let mut variables = import.files.get(file).into_iter().flat_map(|file| &file.variables);
+        if let Some(columns) = variables
+            .find(|variable| variable.name == name)
+            .map(|found| found.columns.clone())
+        {
+            import.set_meanings(file, columns, meaning);
         }
     }
 
     /// Shows the columns of files that the user has opened.
-    fn show_import(&mut self, draft: Draft, effects: &mut Vec<Effect>) {
-        (self.draft, self.missing) = (Some(draft), None);
+    fn show_columns(&mut self, effects: &mut Vec<Effect>) {
         self.changed.clear();
         self.shows_columns = true;
         effects.push(Effect::ChooseSource(SourceKind::Recording));
-    }
-
-    fn take_network(
-        &mut self,
-        file: NetworkFile,
-        import: Option<Result<Box<Opened>, String>>,
-        shared: &Shared,
-        effects: &mut Vec<Effect>,
-    ) {
-        let summary = RunSummary::of(&file);
-        let is_listed = shared.runs.workspace.runs.iter().any(|run| *run.summary == summary);
-        match import {
-            None => effects.push(Effect::TakeSetup(Box::new(file.setup()))),
-            Some(import) => {
-                self.held_out = None;
-                take_settings(file.settings, effects);
-                match import {
-                    Ok(opened) => self.take(*opened, shared, effects),
-                    Err(reason) => effects.push(failed(&reason)),
-                }
-            }
-        }
-        let text = format!(
-            "The settings of {} are set. Its run is listed in Compare.",
-            file.source_name()
-        );
-        effects.push(Effect::Notify(Matter::Recording, Notice::Done(text)));
-        if !is_listed {
-            effects.push(Effect::KeepRun(Box::new(file)));
-        }
     }
 
     /// Sets the share held out for validation when another method needs another share, unless the user has set it.
     fn follow_method(&mut self, settings: &RunSettings) {
         let fraction = settings.validation_fraction();
         let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.opening.is_reopening;
-        if let (true, Some(draft)) = (is_new, &mut self.draft) {
-            draft.plan.division.validation_fraction = Some(fraction);
+        if let (true, Some(import)) = (is_new, &mut self.import) {
+            import.edit().division.validation_fraction = Some(fraction);
         }
         self.held_out = Some(fraction);
     }
@@ -345,54 +365,44 @@ impl RecordingEditor {
 
     /// Returns the plan of the import, or what is missing and what to do.
     fn plan(&self) -> Result<Arc<Plan>, String> {
-        if let Some(missing) = self
-            .missing
-            .as_ref()
-            .and_then(|missing| missing.missing().first().copied())
-        {
+        if let Some(missing) = self.missing.as_ref().and_then(|missing| missing.missing.first()) {
+            let name = file_name(missing);
             return Err(format!(
-                "{} is missing: find it under “Files”, or open another recording.",
-                file_name(missing)
+                "{name} is missing: find it under “Files”, or open another recording."
             ));
         }
-        match &self.draft {
-            None => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
-            Some(_) if self.opening.under_way.is_some() => Err("Files are being opened.".to_owned()),
-            Some(draft) => match draft.obstacle() {
-                Some(obstacle) => Err(obstacle),
-                None => draft.planned(),
-            },
+        match (&self.import, self.obstacle()) {
+            (None, _) => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
+            (Some(_), _) if self.opening.under_way.is_some() => Err("Files are being opened.".to_owned()),
+            (Some(_), Some(obstacle)) => Err(obstacle),
+            (Some(import), None) => Ok(Arc::clone(&import.plan)),
         }
     }
 
-    /// Returns the plan of the import, if it is complete.
-    pub(super) fn planned(&self) -> Option<Arc<Plan>> {
-        self.draft.as_ref()?.planned().ok()
+    /// Returns the reason why there is nothing to train on yet: a text that was refused, or what the plan lacks.
+    pub(super) fn obstacle(&self) -> Option<String> {
+        let refused = self.typed.values().find_map(|typed| typed.refusal.clone());
+        refused.or_else(|| self.import.as_ref()?.obstacle())
     }
 
     /// Returns the numbers of inputs and targets, once there are both.
     pub fn channels(&self) -> Option<(usize, usize)> {
-        let draft = self.draft.as_ref()?;
-        let channels = (draft.count(Meaning::Input), draft.count(Meaning::Target));
-        (channels.0 > 0 && channels.1 > 0).then_some(channels)
+        let import = self.import.as_ref()?;
+        let channels = (import.count(Meaning::Input), import.count(Meaning::Target));
+        Some(channels).filter(|channels| channels.0 > 0 && channels.1 > 0)
     }
 
     /// Returns the size of a training with one network, once the import is checked.
     pub fn training_size(&self, settings: &RunSettings) -> Option<TrainingSize> {
         let checked = self.checking.checked.as_ref()?.as_ref().ok()?;
-        let (inputs, targets) = checked.channels;
-        let is_shared = settings.source.row_model() == RowModel::Shared;
-        is_shared.then_some(TrainingSize {
-            samples: checked.samples[0],
-            inputs,
-            targets,
-            networks: 1,
-        })
+        (settings.source.row_model() == RowModel::Shared).then_some(checked.size)
     }
 
     /// Returns true if a column contains the row numbers.
     pub fn has_row_wires(&self) -> bool {
-        self.draft.as_ref().is_some_and(|draft| draft.has(Meaning::RowWire))
+        self.import
+            .as_ref()
+            .is_some_and(|import| import.plan.import.row_wire.is_some())
     }
 
     /// Returns true if the columns take the place of the results in the middle of the view.
@@ -402,18 +412,20 @@ impl RecordingEditor {
 
     /// Returns the files of the import, which must not be overwritten.
     pub fn files_in_use(&self) -> Vec<FileInUse> {
-        let plan = self.planned();
-        let files = plan.iter().flat_map(|plan| plan.files());
-        let paths = self.draft.iter().flat_map(Draft::paths);
-        files.chain(paths).map(FileInUse::Recording).collect()
+        let files = self.import.iter().flat_map(|import| import.plan.files());
+        files.map(FileInUse::Recording).collect()
     }
 }
 
-pub(super) fn failed(reason: &str) -> Effect {
-    Effect::Notify(Matter::Recording, Notice::Failed(reason.to_owned()))
+fn failed(reason: String) -> Effect {
+    Effect::Notify(Matter::Recording, Notice::Failed(reason))
 }
 
 fn take_settings(settings: RunSettings, effects: &mut Vec<Effect>) {
     effects.push(Effect::ChooseSource(SourceKind::Recording));
     effects.push(Effect::ConfigureRecording(Box::new(settings)));
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
