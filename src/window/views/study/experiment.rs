@@ -128,12 +128,10 @@ impl ExperimentForm {
         let (_, trials, _) = outcome.parts();
         let networks = trials.saturating_mul(folds).saturating_mul(experiment.base.starts);
         let epochs = counted(experiment.base.training.stopping.epochs, "epoch");
-        Ok(Task {
-            size: format!("{} of at most {epochs}", counted(networks, "training")),
-            outcome: Box::new(outcome),
-            setup: None,
-            run: Box::new(move |reporter| run(experiment, &setup, reporter)),
-        })
+        let size = format!("{} of at most {epochs}", counted(networks, "training"));
+        Ok(Task::new(size, outcome, move |reporter| {
+            run(experiment, &setup, reporter)
+        }))
     }
 
     /// Returns the sweep for the terminal.

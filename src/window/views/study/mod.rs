@@ -40,8 +40,9 @@ use crate::window::{
 };
 
 use experiment::ExperimentForm;
-use report::{Note, Page, Point, Report, Row, Tone};
+use report::{Note, Page, Report, Row, Tone};
 use speed::SpeedForm;
+use state::Study;
 pub use state::StudyView;
 use value_list::ValueList;
 
@@ -157,22 +158,16 @@ impl Form {
         };
         let setup = train.clone()?;
         if setup.plan().is_none() {
-            return Err(
-                "This is about recordings: choose one as the source in the Train view. The Sensor view shows \
-                        what the readings of an array determine."
-                    .to_owned(),
-            );
+            return Err("This is about recordings: choose one in the Train view; Sensor is about arrays.".to_owned());
         }
         let trainings = folds.map_or_else(String::new, |folds| format!(", {}", counted(folds, "training")));
-        Ok(Task {
-            size: format!("{}{trainings}", setup.source_name()),
-            outcome: Box::new(None::<Report>),
-            setup: Some(setup.clone()),
-            run: Box::new(move |reporter| match folds {
-                Some(folds) => readings::cross_validate(&setup, folds, reporter),
-                None => readings::find(&setup, reporter),
-            }),
-        })
+        let (size, of) = (format!("{}{trainings}", setup.source_name()), setup.clone());
+        let mut task = Task::new(size, None::<Report>, move |reporter| match folds {
+            Some(folds) => readings::cross_validate(&of, folds, reporter),
+            None => readings::find(&of, reporter),
+        });
+        task.study.setup = Some(setup);
+        Ok(task)
     }
 
     /// Shows the fields.
@@ -190,19 +185,27 @@ impl Form {
     }
 }
 
-/// Work of a background job.
+/// Work of a background job, and the results without results.
 struct Task {
-    /// How much work it is.
-    size: String,
-    /// The outcome without results.
-    outcome: Box<dyn Outcome>,
-    /// Setup of the recording, if it is about the one of the Train view.
-    setup: Option<Setup>,
+    study: Study,
     /// Does the work, or says why that is not possible and what to do.
     run: Box<Work>,
 }
 
 type Work = dyn FnOnce(&Reporter) -> Result<(), String> + Send;
+
+impl Task {
+    fn new(
+        size: String,
+        outcome: impl Outcome + 'static,
+        run: impl FnOnce(&Reporter) -> Result<(), String> + Send + 'static,
+    ) -> Self {
+        Self {
+            study: Study::new(size, Box::new(outcome)),
+            run: Box::new(run),
+        }
+    }
+}
 
 /// Sending end of the events of a task.
 type Reporter = job::Report<StudyEvent>;

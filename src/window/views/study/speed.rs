@@ -26,12 +26,12 @@ use decoupler_core::{
 use decoupler_files::{
     export::{NetworkFile, format_percent, trade_off_points, trade_off_summary},
     figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure},
-    import::{Recorded, Setup, SetupSets},
+    import::{Recorded, Setup},
     machine::memory_budget,
 };
 use eframe::egui::Ui;
 
-use super::{NamedTable, Note, Outcome, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
+use super::{NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
 use crate::window::{
     shared::{Effect, Exporting, NetworkSource, sentence},
     widgets::{
@@ -96,12 +96,10 @@ impl SpeedForm {
             ..SpeedOutcome::default()
         };
         let is_quiet = Arc::clone(is_quiet);
-        Ok(Task {
-            size: counted(plan.points(), "point"),
-            outcome: Box::new(outcome),
-            setup: None,
-            run: Box::new(move |reporter| measure(&plan, &is_quiet, reporter)),
-        })
+        let size = counted(plan.points(), "point");
+        Ok(Task::new(size, outcome, move |reporter| {
+            measure(&plan, &is_quiet, reporter)
+        }))
     }
 
     fn plan(&self, base: &Setup) -> Result<SpeedPlan, String> {
@@ -333,22 +331,15 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
         reporter.is_cancelled()
     };
     let job = Job::new(&is_cancelled);
-    let mut last: Option<(&Setup, SetupSets)> = None;
     for (number, run) in plan.runs.iter().enumerate() {
         if run.setup.plan().is_none() {
             let workload = Workload::of_trade_off(run.setup.settings(), &plan.hidden, &run.decoders);
             let checked = workload.and_then(|workload| workload.check_memory(memory_budget()));
             checked.map_err(|error| error.to_string())?;
         }
-        let sets = match last.take() {
-            // The samples of a recording are read only once.
-            Some((of, sets)) if of.plan().is_some() && of.plan() == run.setup.plan() => sets,
-            _ => {
-                let on_progress = &mut |progress| reporter.progress(StudyEvent::Reading(progress), |_, _| ());
-                let sets = run.setup.sets(Path::new(""), &job, on_progress);
-                sets.map_err(|error| error.to_string())?
-            }
-        };
+        let on_progress = &mut |progress| reporter.progress(StudyEvent::Reading(progress), |_, _| ());
+        let sets = run.setup.sets(Path::new(""), &job, on_progress);
+        let sets = sets.map_err(|error| error.to_string())?;
         let recorded = sets.recorded();
         let unit = decoded_unit(&sets.sets.test);
         reporter.send(StudyEvent::Samples(number, unit, recorded.cloned().map(Box::new)));
@@ -362,7 +353,6 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
         let settings = run.setup.settings();
         let measured = measure_trade_off(settings, &sets.sets, &plan.hidden, &run.decoders, &job, on_point);
         measured.map_err(|error| error.to_string())?;
-        last = Some((&run.setup, sets));
     }
     Ok(())
 }
@@ -400,7 +390,6 @@ impl SpeedOutcome {
             rows: rows(level, table.columns.len()),
             table,
             figure: Some(trade_off_figure(level, limits).into()),
-            points: level.points.iter().map(point).collect(),
             notes: self.notes(number, limits),
         }
     }
@@ -408,7 +397,7 @@ impl SpeedOutcome {
     fn notes(&self, number: usize, limits: &TradeOffLimits) -> Vec<Note> {
         let level = &self.levels[number];
         let refused = self.refused.iter().filter(|(of, _)| *of == number);
-        let mut notes = Vec::from_iter(refused.map(|(_, reason)| Note::Warning(sentence(reason))));
+        let mut notes = Vec::from_iter(refused.map(|(_, reason)| Note::Line(Tone::Warning, sentence(reason))));
         notes.push(Note::Heading("Recommended decoders"));
         let questions = [
             ("Fastest", "No measured decoder is this accurate."),
@@ -495,33 +484,31 @@ fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
     let mut order = Vec::from_iter(0..level.points.len());
     order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
     let row = |item: usize| {
+        let point = &level.points[item];
+        let cost = |cost: TradeOffCost| cost.of(point).into();
+        let mut facts = point_facts(point);
+        facts.push(format!(
+            "at most {}",
+            counted(point.settings.training.stopping.epochs, "epoch")
+        ));
         let of_cost = |is_on_front| if is_on_front { Tone::Own } else { Tone::Usual };
         let mut tones = vec![Tone::Usual; columns];
         // The last columns are the costs.
         tones[columns - 2..].copy_from_slice(&[decoding[item], training[item]].map(of_cost));
         Row {
             item,
-            name: point_name(&level.points[item]),
+            name: point_name(point),
             meaning: "A blue time is on the Pareto front: no other point has as small an error in as little time.",
-            dot: Some(Ink::of_decoder(level.points[item].report.kind)),
+            dot: Some(Ink::of_decoder(point.report.kind)),
             tones,
+            facts,
+            places: vec![
+                ("Decoding", cost(TradeOffCost::Decoding)),
+                ("Training", cost(TradeOffCost::Training)),
+            ],
         }
     };
     order.into_iter().map(row).collect()
-}
-
-fn point(point: &TradeOffPoint) -> Point {
-    let [decoding, training] = TradeOffCost::ALL.map(|cost| cost.of(point).into());
-    let mut facts = point_facts(point);
-    facts.push(format!(
-        "at most {}",
-        counted(point.settings.training.stopping.epochs, "epoch")
-    ));
-    Point {
-        name: point_name(point),
-        facts,
-        places: [("Decoding", decoding), ("Training", training)],
-    }
 }
 
 #[cfg(test)]
