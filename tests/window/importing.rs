@@ -85,8 +85,7 @@ fn from_the_first_start_a_dropped_file_is_an_onnx_network_after_three_clicks() {
     assert!(driver.state().recording.is_auto);
     driver.click("▶ Train");
     driver.wait_for_training();
-    driver.click_button("Export");
-    driver.click_button("ONNX, f32");
+    driver.export("ONNX, f32");
     let onnx = folder.path().join("network");
     driver.type_into("File", &onnx.display().to_string());
     driver.click_button("Save");
