@@ -263,7 +263,7 @@ fn displayed_pictures_are_saved_in_the_format_of_their_extension() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open();
     driver.open_menu();
-    assert!(!driver.is_enabled(CHART), "nothing to save yet");
+    assert!(!driver.is_enabled("Figure…"), "nothing to save yet");
     driver.press(Key::Escape);
     driver.configure_small();
     driver.train();

@@ -52,7 +52,7 @@ fn the_baselines_are_shown_before_a_training() {
     assert_eq!(driver.table()[..expected.len()], expected);
     assert!(driver.has("Published") && driver.says("Press Train to fill in the network's row"));
     driver.open_menu();
-    assert!(!driver.is_enabled("ONNX, f64") && driver.says("Nothing is trained yet"));
+    assert!(!driver.is_enabled("Network…") && driver.says("Nothing is trained yet"));
     driver.press(eframe::egui::Key::Escape);
 
     // Other samples to train on, the same to test on.
@@ -82,8 +82,8 @@ fn presets_set_the_array_and_its_surface_follows() {
         assert_eq!(driver.state().draft.simulation().unwrap().sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
-            let frame = &driver.views().train.drawn.frames.actual;
-            frame.nodes_mm.len() == scale.rows() * scale.nodes_per_row()
+            let drawn = driver.views().train.drawn.surfaces.as_ref();
+            drawn.is_some_and(|drawn| drawn.actual.nodes.len() == scale.rows() * scale.nodes_per_row())
         });
     }
     driver.settle();
@@ -222,9 +222,11 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
         .views()
         .train
         .drawn
-        .frames
+        .surfaces
+        .as_ref()
+        .unwrap()
         .actual
-        .nodes_mm
+        .nodes
         .iter()
         .map(|node| node.x)
         .collect();

@@ -19,7 +19,7 @@ use crate::{
 };
 
 const SAVE: &str = "Checkpoint, resumable";
-const OPEN: &str = "Type the path of a checkpoint";
+const OPEN: &str = "Open checkpoint…";
 
 /// Types `path` into the form behind `button` and confirms.
 fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
@@ -87,7 +87,7 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
         assert_eq!(shown.starts, starts);
         assert_eq!(shown.history, run.leader().history());
         opened.driver.assert_shows(&network_figures(&run));
-        assert!(opened.driver.has("SPREAD OVER 4 STARTS"));
+        assert!(opened.driver.has("SPREAD OVER 4 RESTARTS"));
         let percent = Spread::of(starts.iter().filter_map(StartRecord::percent)).unwrap();
         let validation = Spread::of(starts.iter().map(StartRecord::deciding_mse)).unwrap();
         assert!(percent.smallest < percent.largest, "the starts differ");
@@ -129,7 +129,7 @@ fn the_spread_is_shown_while_the_starts_train() {
         driver.state().phase == Phase::Training
             && starts.is_some_and(|starts| starts.len() == 3 && starts[0].epochs > 1)
     });
-    assert!(driver.has("SPREAD OVER 3 STARTS") && driver.has("0 of 3 starts ended"));
+    assert!(driver.has("SPREAD OVER 3 RESTARTS") && driver.has("0 of 3 restarts ended"));
     driver.click("■ Stop");
     ended(&mut driver);
     let settings = RunSettings {
@@ -153,7 +153,8 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
         driver.click("▶ Train");
         driver.wait_for_epochs(5);
         driver.open_menu();
-        assert!(!driver.is_enabled(SAVE), "a training is paused first");
+        driver.choose_export(SAVE);
+        assert!(!driver.is_enabled("Save…"), "a training is paused first");
         assert!(driver.says("A training under way cannot be saved"));
         driver.press(eframe::egui::Key::Escape);
         pause(driver);
@@ -209,7 +210,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     let mut driver = Driver::open();
     enter_path(&mut driver, OPEN, &terminal);
     driver.wait("the training", |driver| driver.epochs() == 7);
-    assert!(driver.state().draft == settings && driver.has("SPREAD OVER 3 STARTS"));
+    assert!(driver.state().draft == settings && driver.has("SPREAD OVER 3 RESTARTS"));
     save(&mut driver, SAVE, &window);
     driver.click("▶ Resume");
     ended(&mut driver);
@@ -230,7 +231,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     driver.wait("the ended training", |driver| {
         driver.state().phase == Phase::Ended(StopReason::EpochsReached)
     });
-    assert!(driver.has("Continue"));
+    assert!(driver.has("Train longer"));
 }
 
 /// Starts run in parallel: their wall time is saved, and without it no time is shown.
@@ -302,7 +303,7 @@ fn levenberg_marquardt_continues_where_momentum_ended() {
     driver.train();
     assert_eq!(driver.epochs(), 15);
     choose_method(&mut driver, "Levenberg-Marquardt");
-    driver.click("Continue");
+    driver.click("Train longer");
     ended(&mut driver);
     let mut run = trained(momentum(15));
     run.continue_with(Method::default()).unwrap();
@@ -330,7 +331,7 @@ fn levenberg_marquardt_continues_where_momentum_ended() {
     assert!(driver.says(" from epoch 15"));
 
     driver.enter("Hidden nodes", "7");
-    assert!(!driver.has("Continue"), "another network begins again");
+    assert!(!driver.has("Train longer"), "another network begins again");
 }
 
 #[test]
@@ -340,7 +341,7 @@ fn more_epochs_of_the_same_method_give_the_result_of_a_longer_training() {
         opened.change(|settings| settings.training = momentum(15).training);
         let (driver, setup) = (&mut opened.driver, &opened.setup);
         driver.train();
-        driver.click("Continue");
+        driver.click("Train longer");
         ended(driver);
         let whole = run_of(&with_epochs(setup, 30));
         assert_eq!(driver.state().run.as_ref().unwrap().history, whole.leader().history());
@@ -356,10 +357,10 @@ fn a_paused_training_can_be_continued_with_another_method_or_resumed_as_it_was()
     let mut driver = Driver::open();
     start_endless(&mut driver);
     pause(&mut driver);
-    assert!(!driver.has("Continue"), "Resume does that");
+    assert!(!driver.has("Train longer"), "Resume does that");
     assert!(!driver.is_enabled("Hidden nodes") && !driver.is_enabled("Restarts"));
     choose_method(&mut driver, "Levenberg-Marquardt");
-    assert!(driver.has("Continue"));
+    assert!(driver.has("Train longer"));
     driver.click("▶ Resume");
     assert_eq!(driver.state().draft, momentum(1_000_000), "as it was");
     driver.wait_for_epochs(5);
@@ -369,7 +370,7 @@ fn a_paused_training_can_be_continued_with_another_method_or_resumed_as_it_was()
     choose_method(&mut driver, "Levenberg-Marquardt");
     driver.enter("Mu", "1e-2");
     driver.enter("Epochs", "4");
-    driver.click("Continue");
+    driver.click("Train longer");
     ended(&mut driver);
     let mut run = stepped(momentum(1_000_000), held);
     let training = driver.state().draft.training;
@@ -387,7 +388,7 @@ fn a_paused_training_can_be_continued_with_another_method_or_resumed_as_it_was()
 #[test]
 fn continue_is_not_offered_without_a_training_or_after_divergence() {
     let mut driver = Driver::open();
-    assert!(!driver.has("Continue"), "there is nothing to continue from");
+    assert!(!driver.has("Train longer"), "there is nothing to continue from");
     driver.configure_small();
     choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.enter("Learning rate", "1e6");
@@ -395,7 +396,7 @@ fn continue_is_not_offered_without_a_training_or_after_divergence() {
     driver.enter("Epochs", "100000");
     driver.train();
     assert_eq!(driver.state().phase, Phase::Ended(StopReason::Diverged));
-    assert!(!driver.has("Continue"));
+    assert!(!driver.has("Train longer"));
 }
 
 #[test]
@@ -424,7 +425,7 @@ fn the_spread_and_continue_fit_in_narrow_windows() {
     driver.enter("Epochs", "1");
     driver.train();
     driver.settle();
-    let buttons = ["Next snapshot", "Continue", "▶ Train", "⏸ Pause"].map(|label| driver.get(label).rect());
+    let buttons = ["Next snapshot", "Train longer", "▶ Train", "⏸ Pause"].map(|label| driver.get(label).rect());
     assert!(
         buttons.windows(2).all(|pair| pair[0].right() <= pair[1].left()),
         "{buttons:?}"

@@ -493,16 +493,20 @@ impl Driver {
     #[track_caller]
     pub(crate) fn click_and_copy(&mut self, label: &str) -> Option<String> {
         self.get(label).click();
-        let mut copied = None;
-        for _ in 0..3 {
+        // It is copied in the background.
+        for _ in 0..200 {
             self.harness.step();
             let commands = &self.harness.output().platform_output.commands;
-            copied = copied.or(commands.iter().find_map(|command| match command {
+            let copied = commands.iter().find_map(|command| match command {
                 OutputCommand::CopyText(text) => Some(text.clone()),
                 _ => None,
-            }));
+            });
+            if copied.is_some() {
+                return copied;
+            }
+            std::thread::sleep(Duration::from_millis(5));
         }
-        copied
+        None
     }
 
     /// Presses a key.

@@ -43,7 +43,16 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     shows_the_baselines_of(&driver, opened);
     assert!(!driver.has("Published"), "the paper has no print");
     // A print: most of the surface is at rest, and the middle of it is pressed.
-    let depths_mm = driver.views().train.drawn.frames.actual.nodes_mm.iter();
+    let depths_mm = driver
+        .views()
+        .train
+        .drawn
+        .surfaces
+        .as_ref()
+        .unwrap()
+        .actual
+        .nodes
+        .iter();
     let depths_mm: Vec<f64> = depths_mm.map(|node| 5.0 - node.z).collect();
     let at_rest = depths_mm.iter().filter(|depth_mm| **depth_mm < 0.01).count();
     let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);

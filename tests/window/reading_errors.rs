@@ -77,8 +77,8 @@ fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
     driver.click("Nodes");
     driver.settle();
     let plot = plot_place(&mut driver, "z (mm) against node");
-    let frames = &driver.views().train.drawn.frames;
-    let (nodes, count) = (frames.actual.nodes_mm.len(), 60);
+    let drawn = driver.views().train.drawn.surfaces.as_ref().unwrap();
+    let (nodes, count) = (drawn.actual.nodes.len(), 60);
     assert_eq!(nodes, count, "10 × 6");
     // Across the plot at all heights: the path crosses some points, and gaps between them.
     let mut found = Vec::new();
@@ -185,9 +185,25 @@ fn colours_and_scales_are_chosen_at_the_bar_and_colours_are_remembered() {
 }
 
 #[test]
+fn a_right_click_copies_and_exports_what_the_view_shows() {
+    let mut driver = trained();
+    let cell = driver
+        .table()
+        .into_iter()
+        .find(|cell| cell.starts_with("network, Z %"))
+        .unwrap();
+    driver.right_click(&cell);
+    let table = driver.click_and_copy("Copy error table").unwrap();
+    assert!(table.lines().any(|line| line.starts_with("network\t")), "{table}");
+    driver.right_click(&cell);
+    driver.click("Export error table…");
+    assert!(driver.has("Export data"));
+}
+
+#[test]
 fn a_picture_is_copied_from_its_card() {
     let mut driver = trained();
     driver.right_click("Decoded surface");
-    driver.click("Copy surfaces as a picture");
+    driver.click("Copy surfaces");
     driver.wait("the picture", |driver| driver.says("Copied the surfaces as a picture"));
 }

@@ -241,7 +241,9 @@ fn nodes_beyond_the_axes_are_reported_as_drawn_at_the_edge() {
     driver.train();
     let run = driver.state().run.as_ref().unwrap();
     let result = run.result.as_ref().unwrap();
-    let nodes = run.test.array().unwrap().frame(result.answers.view(), 0).nodes_mm;
+    let nodes = run.test.drawing(Some(&result.answers), 0).unwrap().decoded.unwrap()[0]
+        .nodes
+        .clone();
     // The best network is the untrained one before the first step.
     assert_eq!(result.best_epoch, 0);
     let (low, high) = (4.0 - 0.08, 5.0 + 0.08);

@@ -3,20 +3,18 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
-use super::{
-    DecouplerWindow, clipboard::ToCopy, files::ToWrite, modal::Modal, remembered::is_within_limits, save_form::Saving,
-};
+use super::{DecouplerWindow, files::ToWrite, modal::Modal, remembered::is_within_limits, save_form::Saving};
 use crate::window::{
     job::caught,
     preview,
     shared::{
-        Effect, FileInUse, FileTask, Look, Matter, Phase, Purpose, RecordingDraft, RunView, SourceKind, ViewKind,
+        Effect, FileInUse, FileTask, Look, Matter, Phase, Purpose, RecordingDraft, RunsRequest, SourceKind, ViewKind,
     },
     theme,
-    training_worker::{Inspection, LOST, Origin, Request, TrainedRun},
+    training_worker::{LOST, Origin, Request, TrainedRun},
     views::CHECKPOINT,
 };
-use decoupler_core::{dataset::Simulation, evaluation::RunSettings};
+use decoupler_core::evaluation::RunSettings;
 use decoupler_files::import::Setup;
 
 impl DecouplerWindow {
@@ -86,19 +84,17 @@ impl DecouplerWindow {
                 }
             }
             Effect::Look(look) => self.look(look),
-            Effect::Watch(snapshot) => self.worker.watch(snapshot),
             Effect::ChooseFile(task) => {
                 if !self.dialogs.ask(&task) {
                     self.type_path(task);
                 }
             }
             Effect::Export(exporting) => self.modal = Some(Modal::Export(*exporting)),
-            Effect::Copy { text, notice } => self.copy_text(text, notice),
-            Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
-            Effect::KeepRun(file) => self.runs.keep(*file),
-            Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
-            Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
-            Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
+            Effect::Copy(to_copy, notice) => self.copy(to_copy, notice),
+            Effect::KeepRun(file) => self.runs.ask(RunsRequest::Keep(file)),
+            Effect::RenameRun(id, name) => self.runs.ask(RunsRequest::Rename(id, name)),
+            Effect::PinRun(place, id) => self.runs.ask(RunsRequest::Pin(place, id)),
+            Effect::RemoveRun(id) => self.runs.ask(RunsRequest::Remove(id)),
             Effect::Notify(matter, notice) => self.notices.add(matter, notice),
             Effect::Settle(matter) => self.notices.settle(matter),
         }
@@ -113,7 +109,16 @@ impl DecouplerWindow {
         self.shared.phase = Phase::Preparing;
         self.notices.settle(Matter::Training);
         self.notices.settle(Matter::Settings);
+        if self.worker.has_died() {
+            self.restart_worker();
+        }
         self.worker.begin(origin);
+    }
+
+    /// Starts the worker again after it died.
+    pub(super) fn restart_worker(&mut self) {
+        self.worker.restart(Arc::clone(&self.wake));
+        self.keep_trainings();
     }
 
     /// Chooses settings automatically from now on, or begins with those that were chosen.
@@ -135,7 +140,7 @@ impl DecouplerWindow {
     pub(super) fn show(&mut self, view: ViewKind) {
         self.shared.shown = view;
         // Another window may have changed the list.
-        self.runs.look();
+        self.runs.ask(RunsRequest::Look);
     }
 
     /// Sets the look of all surfaces, and remembers the colours that the user chose.
@@ -151,20 +156,15 @@ impl DecouplerWindow {
         theme::apply(&self.ctx, is_dark);
     }
 
-    /// Asks for a path in the window itself, and suggests the path typed last for the same file.
+    /// Asks for a path in the window itself.
     pub(super) fn type_path(&mut self, task: FileTask) {
-        let is_same = |typed: &&Saving| typed.task.is_same_file(&task);
-        let path = match self.typed.as_ref().filter(is_same) {
-            Some(typed) => typed.path.clone(),
-            None => task.suggested_path().display().to_string(),
-        };
+        let path = task.suggested_path().display().to_string();
         self.modal = Some(Modal::Path(Saving::new(task, path, None)));
     }
 
     /// Closes the form and carries out its task on the file at `path`; `asks` whether a file there may be replaced.
     pub(super) fn take_typed(&mut self, path: PathBuf, asks: bool) {
         if let Some(Modal::Path(typed)) = self.modal.take() {
-            self.typed = Some(typed.clone());
             self.answer(typed.task, path, asks);
         }
         self.ctx.request_repaint();
@@ -203,7 +203,7 @@ impl DecouplerWindow {
                 };
                 match run {
                     Some(run) => {
-                        let inspection = Inspection::new(move |trained| take(trained.map(Some)));
+                        let inspection = Box::new(move |trained: Result<&TrainedRun, &str>| take(trained.map(Some)));
                         self.worker.ask(Request::Inspect(run, inspection));
                     }
                     None => take(Ok(None)),
@@ -225,14 +225,6 @@ impl DecouplerWindow {
         }
     }
 
-    /// Starts the worker again after it died.
-    pub(super) fn restart_worker(&mut self) {
-        self.worker.restart(Arc::clone(&self.wake));
-        self.keep_trainings();
-        self.shared.phase = self.shared.phase_at_rest();
-        self.notices.settle(Matter::Training);
-    }
-
     /// Takes new settings; if they change the test set, shows that of the new ones.
     pub(super) fn configure(&mut self, draft: RunSettings) {
         let before = std::mem::replace(&mut self.shared.draft, draft);
@@ -240,10 +232,7 @@ impl DecouplerWindow {
         if is_within_limits(&draft) {
             self.notices.settle(Matter::Settings);
         }
-        let run = self.shared.run.as_ref();
-        if run.is_some_and(|run| is_of_test_set(run, &draft)) {
-            self.shared.preview = None;
-        } else if !have_same_sets(&before, &draft) {
+        if !have_same_sets(&before, &draft) {
             self.request_preview();
         }
     }
@@ -253,7 +242,6 @@ impl DecouplerWindow {
         self.shared.source = source;
         self.notices.settle(Matter::Settings);
         if source == SourceKind::Array {
-            self.configure(self.shared.draft);
             self.request_preview();
         }
     }
@@ -278,44 +266,39 @@ impl DecouplerWindow {
         }
     }
 
-    /// Requests the test set and baselines shown before a training, unless they are known.
+    /// Requests the test set and baselines shown before a training, unless the current training has them.
     pub(super) fn request_preview(&mut self) {
-        let shared = &self.shared;
+        let shared = &mut self.shared;
         let draft = shared.draft;
-        match (&shared.preview, &shared.run) {
-            (Some(preview), _) if have_same_test_set(&preview.settings, &draft) => {
-                preview::compare(&mut self.previews, draft);
-            }
-            (None, Some(run)) if is_of_test_set(run, &draft) => {}
-            _ => preview::draw(&mut self.previews, draft),
+        if shared
+            .run
+            .as_ref()
+            .is_some_and(|run| have_same_test_set(run.settings(), &draft))
+        {
+            shared.preview = None;
+            return self.previews.abandon();
         }
+        let preview = shared.preview.as_ref();
+        let is_known = preview.is_some_and(|preview| have_same_test_set(&preview.settings, &draft));
+        preview::request(&mut self.previews, draft, is_known);
     }
 }
 
-/// Returns true if `run` is on a simulated array with the test set of these settings.
-pub(super) fn is_of_test_set(run: &RunView, settings: &RunSettings) -> bool {
-    have_same_test_set(run.settings(), settings)
-}
-
 /// Returns true if both draw the same test set.
-pub(super) fn have_same_test_set(a: &RunSettings, b: &RunSettings) -> bool {
+fn have_same_test_set(a: &RunSettings, b: &RunSettings) -> bool {
     let test_set = |settings: &RunSettings| {
-        let Simulation {
-            sensor,
-            scene,
-            test_samples,
-            ..
-        } = *settings.simulation()?;
-        Some((sensor, scene, test_samples, settings.seed))
+        let simulation = settings.simulation()?;
+        Some((
+            simulation.sensor,
+            simulation.scene,
+            simulation.test_samples,
+            settings.seed,
+        ))
     };
     test_set(a).is_some() && test_set(a) == test_set(b)
 }
 
 /// Returns true if both draw the same samples, trained on or not.
-pub(super) fn have_same_sets(a: &RunSettings, b: &RunSettings) -> bool {
-    let samples = |settings: &RunSettings| {
-        let simulation = settings.simulation()?;
-        Some((simulation.samples, simulation.validation_samples))
-    };
-    have_same_test_set(a, b) && samples(a) == samples(b)
+fn have_same_sets(a: &RunSettings, b: &RunSettings) -> bool {
+    (a.source, a.seed) == (b.source, b.seed)
 }

@@ -1,6 +1,5 @@
 use super::{
     DecouplerWindow,
-    applying::{have_same_sets, have_same_test_set, is_of_test_set},
     files::{Answer, ToWrite, Written},
     modal::Modal,
     save_form::{Saving, Tried},
@@ -8,7 +7,7 @@ use super::{
 use crate::window::{
     job::JobError,
     preview::PreviewEvent,
-    shared::{Matter, Notice, Phase, Preview, RunView, ViewKind},
+    shared::{Matter, Notice, Phase, Preview, RunView, RunsRequest, ViewKind},
     training_worker::{Began, Event, Start},
 };
 use decoupler_core::evaluation::RunSettings;
@@ -58,7 +57,6 @@ impl DecouplerWindow {
     fn report_written(&mut self, (ToWrite { task, path, asks }, written): (ToWrite, Written)) {
         let tried = match written {
             Written::Done(message) => {
-                self.typed = None;
                 return self.notices.add(Matter::File, Notice::Saved(message, path));
             }
             Written::Exists => Tried::Exists,
@@ -72,31 +70,22 @@ impl DecouplerWindow {
         self.modal = Some(Modal::Path(Saving::new(task, path.display().to_string(), Some(tried))));
     }
 
-    pub(super) fn take_preview(&mut self, event: PreviewEvent) {
-        let shared = &mut self.shared;
+    fn take_preview(&mut self, event: PreviewEvent) {
         match event {
-            // The settings have changed meanwhile, and have requested another test set or need none.
-            PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
-            // A training has begun meanwhile, with the same test set.
-            PreviewEvent::Drawn(settings, _)
-                if shared.run.as_ref().is_some_and(|run| is_of_test_set(run, &settings)) => {}
             PreviewEvent::Drawn(settings, Ok(test)) => {
-                shared.preview = Some(Preview {
+                self.shared.preview = Some(Preview {
                     settings: *settings,
                     test,
                     baselines: None,
                 });
-                self.request_preview();
             }
-            PreviewEvent::Drawn(_, Err(error)) => self.notices.fail(Matter::Preview, error),
-            PreviewEvent::Compared(settings, baselines) => {
-                if let Some(preview) = &mut shared.preview
-                    && have_same_sets(&settings, &shared.draft)
-                {
+            PreviewEvent::Compared(Ok(baselines)) => {
+                if let Some(preview) = &mut self.shared.preview {
                     preview.baselines = baselines;
                 }
             }
-            PreviewEvent::Failed(error) => self.notices.fail(Matter::Preview, error),
+            PreviewEvent::Drawn(_, Err(error)) => self.notices.fail(Matter::Preview, error),
+            PreviewEvent::Compared(Err(error)) => self.notices.fail(Matter::Preview, error),
         }
     }
 
@@ -104,6 +93,7 @@ impl DecouplerWindow {
     fn take_begun(&mut self, began: Began, start: Start) {
         let setup = began.setup.clone();
         self.shared.preview = None;
+        self.previews.abandon();
         self.shared.run = Some(RunView {
             // The checkpoint of one that was cut short is removed when the window closes.
             is_saved: start == Start::Paused,
@@ -111,7 +101,6 @@ impl DecouplerWindow {
         });
         if start != Start::New {
             self.take_setup(&setup);
-            self.typed = None;
         }
         self.share_plan();
         self.shared.phase = match start {
@@ -193,13 +182,12 @@ impl DecouplerWindow {
                     run.progress(*progress);
                 }
             }
-            Event::Finished(Ok(file)) => self.runs.keep(*file),
+            Event::Finished(Ok(file)) => self.runs.ask(RunsRequest::Keep(file)),
             Event::Finished(Err(reason)) => self.notices.fail(Matter::Training, reason),
             Event::Died(reason) => {
-                match &reason {
-                    // The next training needs a thread.
-                    Some(JobError::Panicked { .. }) => self.restart_worker(),
-                    _ => shared.phase = Phase::Died,
+                shared.phase = shared.phase_at_rest();
+                if matches!(reason, Some(JobError::Panicked { .. })) {
+                    self.restart_worker();
                 }
                 let reason = reason.map(|error| format!(": {error}")).unwrap_or_default();
                 let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");

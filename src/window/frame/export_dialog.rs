@@ -2,10 +2,9 @@
 //! user chooses the form of an export.
 
 use decoupler_files::export::TableForm;
-use eframe::egui::{
-    Align, ComboBox, Frame, Id, Label, Layout, Margin, Modal, Response, RichText, Ui, containers::menu::MenuButton,
-};
+use eframe::egui::{Align, ComboBox, Label, Layout, Response, RichText, Ui, containers::menu::MenuButton};
 
+use super::modal::{Reply, card_ui};
 use crate::window::{
     shared::{Effect, ExportLine, Exporting, Format, Item, Shown},
     theme::{semibold, space, type_size},
@@ -75,17 +74,14 @@ pub(super) fn card_menu_ui<'a>(part: &Response, shown: impl FnOnce() -> Vec<Show
     });
 }
 
-/// The dialog for one line of the menu: which thing, in which form. Returns the export, or nothing if it is cancelled, once
-/// the user has answered.
-pub(super) fn export_dialog_ui(ui: &Ui, exporting: &mut Exporting, shown: Vec<Shown<'_>>) -> Option<Option<Effect>> {
+/// The dialog for one line of the menu: which thing, in which form.
+pub(super) fn export_dialog_ui(ui: &Ui, exporting: &mut Exporting, shown: Vec<Shown<'_>>) -> Option<Reply> {
     let shown = match &exporting.given {
         Some(source) => Vec::from(Shown::network("", Ok(source.clone()), Vec::new())),
         None => shown,
     };
     let of_line: Vec<_> = shown.iter().filter(|shown| shown.line == exporting.line).collect();
-    let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
-    let modal = Modal::new(Id::unique("export")).frame(frame).show(ui.ctx(), |ui| {
-        ui.set_width(space(110));
+    card_ui(ui, "export", space(110), |ui| {
         let (line, hint) = exporting.line.words();
         let title = format!("Export {}", line.to_lowercase());
         ui.label(RichText::new(title).font(semibold(type_size().title)));
@@ -101,16 +97,15 @@ pub(super) fn export_dialog_ui(ui: &Ui, exporting: &mut Exporting, shown: Vec<Sh
             if ui.memory(|memory| memory.focused().is_none()) {
                 button.request_focus();
             }
-            let cancelled = ui.add(ghost_button("Cancel")).clicked().then_some(None);
+            let is_left = ui.add(ghost_button("Cancel")).clicked();
             let chosen = chosen.filter(|_| button.clicked());
-            chosen
-                .map(|(shown, format)| export(shown, format, exporting))
-                .or(cancelled)
+            let effect = chosen.and_then(|(shown, format)| export(shown, format, exporting));
+            effect
+                .map(|effect| Reply::Apply(Box::new(effect)))
+                .or(is_left.then_some(Reply::Close))
         });
         buttons.inner
-    });
-    let is_left = modal.should_close();
-    modal.inner.or(is_left.then_some(None))
+    })
 }
 
 /// The lists of the dialog, and the description of what is chosen in them. Returns it unless it cannot be exported.

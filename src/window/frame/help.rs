@@ -14,7 +14,7 @@ const IN_FOCUS: [(&str, &str); 8] = [
     ("Zoom a surface", "+ and −"),
     ("Reset the camera", "Home"),
     ("Reset a field to its default", "Double-click"),
-    ("Copy a value, a table or a picture", "Right click"),
+    ("Copy or export a table or a picture", "Right click"),
     ("Next control", "Tab"),
     ("Previous control", "Shift+Tab"),
     ("Close a dialog", "Escape"),

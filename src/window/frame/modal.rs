@@ -1,6 +1,8 @@
 //! The one card over the window that must be answered or closed first: the list of all commands, the help, the form of a
 //! path, or the question before closing.
 
+use std::path::PathBuf;
+
 use eframe::egui::{
     Align, Button, Frame, Id, Key, Layout, Margin, Modal as EguiModal, Modifiers, Response, RichText, ScrollArea,
     TextEdit, Ui, WidgetInfo, accesskit::Role, vec2,
@@ -11,11 +13,11 @@ use super::{
     closing::{Closing, closing_ui},
     export_dialog::export_dialog_ui,
     help::{Help, Page, help_ui},
-    save_form::{self, Saving, save_form_ui},
+    save_form::{Saving, save_form_ui},
 };
 use crate::window::{
-    glossary::{self, Term},
-    shared::{Command, Exporting, Offer},
+    glossary,
+    shared::{About, Command, Effect, Exporting, Offer},
     theme::{Theme, space},
     widgets::dim_ui,
 };
@@ -43,6 +45,10 @@ pub(super) enum Reply {
     Do(Command),
     /// Explain this term.
     Define(&'static str),
+    /// Use this path, after asking about a file that exists there if true.
+    Path(PathBuf, bool),
+    /// Apply this.
+    Apply(Box<Effect>),
     /// Close the window, and keep the running training for the next start or not.
     Leave { keeps_training: bool },
 }
@@ -54,32 +60,25 @@ impl DecouplerWindow {
             Some(Modal::Closing(_)) => self.unfinished(),
             _ => Vec::new(),
         };
-        let files = Vec::from_iter(self.files.paths().map(|path| path.display().to_string())).join(", ");
         let reply = match &mut self.modal {
             None => return,
             Some(Modal::Palette(palette)) => palette_ui(ui, palette, offers),
             Some(Modal::Help(help)) => help_ui(ui, help, offers),
-            Some(Modal::Closing(closing)) => closing_ui(ui, closing, &unfinished, &files),
-            Some(Modal::Path(saving)) => match save_form_ui(ui, saving) {
-                Some(save_form::Reply::Path(path, asks)) => return self.take_typed(path, asks),
-                Some(save_form::Reply::Cancel) => Some(Reply::Close),
-                None => None,
-            },
+            Some(Modal::Closing(closing)) => closing_ui(ui, closing, &unfinished),
+            Some(Modal::Path(saving)) => save_form_ui(ui, saving),
             Some(Modal::Export(exporting)) => {
                 let shown = self.views.get(self.shared.shown).shown(&self.shared);
-                match export_dialog_ui(ui, exporting, shown) {
-                    Some(effect) => {
-                        self.modal = None;
-                        effect.into_iter().for_each(|effect| self.apply(effect));
-                        None
-                    }
-                    None => None,
-                }
+                export_dialog_ui(ui, exporting, shown)
             }
         };
         match reply {
             None => return,
             Some(Reply::Close) => self.modal = None,
+            Some(Reply::Path(path, asks)) => self.take_typed(path, asks),
+            Some(Reply::Apply(effect)) => {
+                self.modal = None;
+                self.apply(*effect);
+            }
             Some(Reply::Do(command)) => (self.modal, self.picked) = (None, Some(command)),
             Some(Reply::Define(term)) => self.modal = Some(Modal::Help(Help::open(Page::Glossary, term))),
             Some(Reply::Leave { keeps_training }) => self.leave(keeps_training),
@@ -108,52 +107,32 @@ pub(super) struct Palette {
 }
 
 /// A line of the list.
-enum Line<'a> {
-    Command(&'a Offer),
-    Term(Term),
+struct Line {
+    name: String,
+    /// Its keys, or where it leads.
+    right: String,
+    /// Its accessible name.
+    label: String,
+    hint: &'static str,
+    /// The answer, unless its command is not available now.
+    reply: Option<Reply>,
 }
 
-impl Line<'_> {
-    /// Returns the answer of the line, unless its command is not available now.
-    fn reply(&self) -> Option<Reply> {
-        match self {
-            Self::Command(offer) => offer.is_possible.then(|| Reply::Do(offer.command.clone())),
-            Self::Term(term) => Some(Reply::Define(term.name)),
-        }
-    }
-
+impl Line {
     fn ui(&self, ui: &mut Ui, is_marked: bool) -> Response {
-        let (name, right, label, hint, is_possible) = match self {
-            Self::Command(offer) => {
-                let about = offer.command.about();
-                let keys = about.keys.map(|keys| ui.ctx().format_shortcut(&keys));
-                // The accessible name leaves out the keys.
-                (
-                    about.name.clone(),
-                    keys.unwrap_or_default(),
-                    about.name,
-                    about.hint,
-                    offer.is_possible,
-                )
-            }
-            Self::Term(term) => {
-                let label = format!("{} in the glossary", term.name);
-                (term.name.to_owned(), "Glossary".to_owned(), label, term.hint, true)
-            }
-        };
-        let right = RichText::new(right).color(Theme::of(ui).palette.dim);
+        let right = RichText::new(&self.right).color(Theme::of(ui).palette.dim);
         let size = vec2(ui.available_width(), space(7));
-        let layout = Layout::left_to_right(Align::Center);
-        let line = ui.allocate_ui_with_layout(size, layout, |ui| {
-            let button = Button::selectable(is_marked, name).min_size(size).right_text(right);
-            ui.add_enabled(is_possible, button)
+        let is_possible = self.reply.is_some();
+        let line = ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+            let button = Button::selectable(is_marked, &self.name);
+            ui.add_enabled(is_possible, button.min_size(size).right_text(right))
         });
         let line = line.inner.on_disabled_hover_text("Not available now");
-        line.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &label));
-        if hint.is_empty() {
+        line.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &self.label));
+        if self.hint.is_empty() {
             line
         } else {
-            line.on_hover_text(hint)
+            line.on_hover_text(self.hint)
         }
     }
 }
@@ -161,7 +140,7 @@ impl Line<'_> {
 fn palette_ui(ui: &Ui, palette: &mut Palette, offers: &[Offer]) -> Option<Reply> {
     card_ui(ui, "palette", space(110), |ui| {
         let mut reply = None;
-        let lines = matching(offers, &palette.typed);
+        let mut lines = matching(ui, offers, &palette.typed);
         // Before the field, which would otherwise handle arrows and Enter.
         let [down, up, enter] = [Key::ArrowDown, Key::ArrowUp, Key::Enter]
             .map(|key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key)));
@@ -179,14 +158,14 @@ fn palette_ui(ui: &Ui, palette: &mut Palette, offers: &[Offer]) -> Option<Reply>
         }
         ui.add_space(space(2));
         ScrollArea::vertical().max_height(space(90)).show(ui, |ui| {
-            for (place, line) in lines.iter().enumerate() {
+            for (place, line) in lines.iter_mut().enumerate() {
                 let is_marked = place == palette.marked;
                 let shown = line.ui(ui, is_marked);
                 if is_marked && (down || up) {
                     shown.scroll_to_me(None);
                 }
                 if shown.clicked() || (is_marked && enter) {
-                    reply = line.reply();
+                    reply = line.reply.take();
                 }
             }
             if lines.is_empty() {
@@ -199,27 +178,42 @@ fn palette_ui(ui: &Ui, palette: &mut Palette, offers: &[Offer]) -> Option<Reply>
 
 /// Returns the commands that contain the typed words in any order in their names, those that contain them in their hints,
 /// and the terms of the glossary with these words; available commands come first.
-fn matching<'a>(offers: &'a [Offer], typed: &str) -> Vec<Line<'a>> {
+fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
     let words: Vec<_> = typed.split_whitespace().map(str::to_lowercase).collect();
     let has_words = |text: &str| words.iter().all(|word| text.to_lowercase().contains(word));
     let mut found = Vec::new();
-    for offer in offers {
-        let about = offer.command.about();
-        let is_named = has_words(&about.name);
-        if is_named || has_words(&format!("{} {}", about.name, about.hint)) {
-            found.push(((!offer.is_possible, !is_named), Line::Command(offer)));
+    for Offer { command, is_possible } in offers {
+        let About { name, keys, hint } = command.about();
+        let is_named = has_words(&name);
+        if is_named || has_words(&format!("{name} {hint}")) {
+            let line = Line {
+                // The accessible name leaves out the keys.
+                label: name.clone(),
+                name,
+                right: keys.map_or(String::new(), |keys| ui.ctx().format_shortcut(&keys)),
+                hint,
+                reply: is_possible.then(|| Reply::Do(command.clone())),
+            };
+            found.push(((!is_possible, !is_named), line));
         }
     }
     found.sort_by_key(|(rank, _)| *rank);
     let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
-    let terms = terms
-        .filter(|term| !words.is_empty() && has_words(term.name))
-        .map(Line::Term);
+    let terms = terms.filter(|term| !words.is_empty() && has_words(term.name));
+    let terms = terms.map(|term| Line {
+        name: term.name.to_owned(),
+        right: "Glossary".to_owned(),
+        label: format!("{} in the glossary", term.name),
+        hint: term.hint,
+        reply: Some(Reply::Define(term.name)),
+    });
     found.into_iter().map(|(_, line)| line).chain(terms).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use eframe::egui::{Context, RawInput};
+
     use super::*;
     use crate::window::shared::ViewKind;
 
@@ -232,13 +226,15 @@ mod tests {
             offer(Command::Show(ViewKind::Compare), true),
         ];
         let names = |typed| {
-            let lines = matching(&offers, typed).into_iter();
-            lines
-                .filter_map(|line| match line {
-                    Line::Command(offer) => Some(offer.command.about().name),
-                    Line::Term(_) => None,
-                })
-                .collect::<Vec<_>>()
+            let mut names = Vec::new();
+            let mut output = Context::default().run_ui(RawInput::default(), |ui| {
+                let lines = matching(ui, &offers, typed).into_iter();
+                let commands = lines.filter(|line| line.right != "Glossary");
+                names = commands.map(|line| line.name).collect::<Vec<_>>();
+            });
+            // Nothing is drawn.
+            output.textures_delta.clear();
+            names
         };
         assert_eq!(names(""), ["Train", "Show Compare", "Stop training"]);
         assert_eq!(names("are show"), ["Show Compare"]);

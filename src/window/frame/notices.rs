@@ -4,7 +4,7 @@ use eframe::egui::{Align, Align2, Area, Frame, Id, Label, Layout, Margin, Order,
 
 use super::{DecouplerWindow, files::open_folder};
 use crate::window::{
-    shared::{Effect, Matter, Notice, Phase},
+    shared::{Effect, Matter, Notice},
     theme::{Theme, space},
     training_worker::{Origin, Request},
 };
@@ -91,8 +91,6 @@ enum Reply {
     Dismiss,
     /// Show the folder of the file that was written.
     OpenFolder,
-    /// Restart the training thread.
-    Restart,
     /// Connect again to the stream that has ended.
     Reconnect,
     /// Resume the training that was cut short.
@@ -106,7 +104,6 @@ impl Reply {
         match self {
             Self::Dismiss => "Dismiss",
             Self::OpenFolder => "Open folder",
-            Self::Restart => "Start again",
             Self::Reconnect => "Try again",
             Self::Resume => "Resume",
             Self::Discard => "Discard",
@@ -121,6 +118,9 @@ impl DecouplerWindow {
         if let Some(seconds) = self.notices.pass(ui.input(|input| input.time)) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(seconds));
         }
+        if self.notices.0.is_empty() {
+            return;
+        }
         let can_reconnect = self.views.live.can_retry(&self.shared);
         let mut answered = None;
         let area = Area::new(Id::unique("notices"))
@@ -133,7 +133,6 @@ impl DecouplerWindow {
                 // From right to left.
                 let replies: &[Reply] = match (&entry.notice, entry.matter) {
                     (Notice::Saved(..), _) => &[Reply::Dismiss, Reply::OpenFolder],
-                    (_, Matter::Training) if self.shared.phase == Phase::Died => &[Reply::Dismiss, Reply::Restart],
                     (_, Matter::Live) if can_reconnect => &[Reply::Dismiss, Reply::Reconnect],
                     (_, Matter::CutShort) if !self.shared.phase.is_busy() => {
                         &[Reply::Dismiss, Reply::Discard, Reply::Resume]
@@ -151,7 +150,6 @@ impl DecouplerWindow {
                     open_folder(path);
                 }
             }
-            Reply::Restart => self.restart_worker(),
             Reply::Reconnect => self.views.live.start(&self.shared, effects),
             Reply::Resume => {
                 self.notices.settle(Matter::CutShort);
@@ -176,22 +174,22 @@ fn notice_ui(ui: &mut Ui, entry: &Entry, replies: &[Reply]) -> Option<Reply> {
         Notice::Failed(text) => (text, palette.bad),
     };
     let frame = Frame::popup(ui.style()).stroke(Stroke::new(1.0, colour));
-    let shown = frame.inner_margin(Margin::symmetric(12, 6)).show(ui, |ui| {
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let mut reply = None;
-            for other in replies {
-                if ui.button(other.name()).clicked() {
-                    reply = Some(*other);
+    let mut reply = None;
+    frame.inner_margin(Margin::symmetric(12, 6)).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                for other in replies {
+                    if ui.button(other.name()).clicked() {
+                        reply = Some(*other);
+                    }
                 }
-            }
-            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                ui.add(Label::new(RichText::new(text).color(colour)).wrap());
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    ui.add(Label::new(RichText::new(text).color(colour)).wrap());
+                });
             });
-            reply
-        })
-        .inner
+        });
     });
-    shown.inner
+    reply
 }
 
 #[cfg(test)]

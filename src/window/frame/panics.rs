@@ -142,9 +142,11 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
     driver.enter("Height", "8");
     driver.wait("the analysis", |driver| driver.says("Condition number: "));
     panics(&mut driver, "clipboard", |driver| {
-        driver.act("Copy singular values as a picture");
+        driver.choose_export("Singular values, Copy");
+        driver.click_button("Copy");
     });
-    driver.act("Copy singular values as a picture");
+    driver.choose_export("Singular values, Copy");
+    driver.click_button("Copy");
     driver.wait("the picture", |driver| matches!(driver.notice(), Some(Notice::Done(_))));
 
     driver.click_button("Study");

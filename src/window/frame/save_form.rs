@@ -1,11 +1,12 @@
 use std::path::PathBuf;
 
 use eframe::egui::{
-    Align, Frame, Id, Key, Layout, Margin, Modal, RichText, TextEdit, Ui,
+    Align, Id, Key, Layout, RichText, TextEdit, Ui,
     text::{CCursor, CCursorRange},
     text_edit::TextEditState,
 };
 
+use super::modal::{Reply, card_ui};
 use crate::window::{
     shared::FileTask,
     theme::{semibold, space, type_size},
@@ -33,14 +34,6 @@ pub enum Tried {
     Refused(String),
 }
 
-/// Answer of the user to the form.
-pub enum Reply {
-    /// Use this path, after asking about a file that exists there if true.
-    Path(PathBuf, bool),
-    /// Cancel.
-    Cancel,
-}
-
 impl Saving {
     /// The task, with a path that typing replaces.
     pub fn new(task: FileTask, path: String, tried: Option<Tried>) -> Self {
@@ -59,10 +52,8 @@ impl Saving {
 }
 
 /// Asks for the path of a file inside the window, for desktops that offer no file dialog.
-pub fn save_form_ui(ui: &mut Ui, saving: &mut Saving) -> Option<Reply> {
-    let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
-    let modal = Modal::new(Id::unique("save form")).frame(frame).show(ui.ctx(), |ui| {
-        ui.set_width(space(110));
+pub(super) fn save_form_ui(ui: &mut Ui, saving: &mut Saving) -> Option<Reply> {
+    card_ui(ui, "save form", space(110), |ui| {
         ui.label(RichText::new(saving.task.title()).font(semibold(type_size().title)));
         dim_ui(ui, saving.task.words.description);
         ui.add_space(space(2));
@@ -81,9 +72,7 @@ pub fn save_form_ui(ui: &mut Ui, saving: &mut Saving) -> Option<Reply> {
         }
         ui.add_space(space(3));
         buttons_ui(ui, saving, has_entered)
-    });
-    let is_left = modal.should_close();
-    modal.inner.or(is_left.then_some(Reply::Cancel))
+    })
 }
 
 /// The field for the path. Returns true if Enter was pressed in it.
@@ -92,6 +81,7 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     let id = Id::unique("path of a file");
     let edit = TextEdit::singleline(&mut saving.path).id(id);
     let edit = ui.add(edit.desired_width(f32::INFINITY)).labelled_by(label.id);
+    let has_entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     // Typing and Enter are enough; Tab still reaches the buttons.
     if ui.memory(|memory| memory.focused().is_none()) {
         edit.request_focus();
@@ -106,7 +96,7 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     if edit.changed() {
         saving.tried = None;
     }
-    edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter))
+    has_entered
 }
 
 fn buttons_ui(ui: &mut Ui, saving: &Saving, has_entered: bool) -> Option<Reply> {
@@ -118,7 +108,7 @@ fn buttons_ui(ui: &mut Ui, saving: &Saving, has_entered: bool) -> Option<Reply> 
                 reply = Some(Reply::Path(saving.path(), false));
             }
             if ui.add(ghost_button("Cancel")).clicked() {
-                reply = Some(Reply::Cancel);
+                reply = Some(Reply::Close);
             }
         });
         return reply;
@@ -131,7 +121,7 @@ fn buttons_ui(ui: &mut Ui, saving: &Saving, has_entered: bool) -> Option<Reply> 
             reply = Some(Reply::Path(saving.path(), true));
         }
         if ui.add(ghost_button("Cancel")).clicked() {
-            reply = Some(Reply::Cancel);
+            reply = Some(Reply::Close);
         }
     });
     reply

@@ -12,9 +12,7 @@ use eframe::egui::Context;
 
 use super::{DecouplerWindow, Desktop};
 use crate::window::{
-    preview::PreviewEvent,
     shared::{Effect, FileTask, FileWords, Matter, Notice, Phase, saying_saved},
-    test_view::TestView,
     training_worker::Worker,
 };
 use decoupler_files::export::NetworkFile;
@@ -146,15 +144,6 @@ fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
             .as_ref()
             .is_some_and(|preview| preview.baselines.is_some())
     });
-}
-
-#[test]
-fn a_test_set_drawn_late_does_not_hide_the_training_that_shows_it() {
-    let mut window = Opened::trained();
-    let settings = window.shared.draft;
-    let drawn = TestView::draw(&settings);
-    window.take_preview(PreviewEvent::Drawn(Box::new(settings), drawn));
-    assert!(window.shared.preview.is_none() && window.shared.result().is_some());
 }
 
 #[test]

@@ -4,14 +4,13 @@ use decoupler_files::export::exit_leaving_nothing;
 use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui, UiBuilder};
 
 use super::{
-    clipboard::{Clipboard, Copying},
+    clipboard::Copying,
     commands::{DraftsUndoer, SCALES, drafts},
     export_dialog::{card_menu_ui, export_menu_ui},
     files::{Dialogs, Files},
     modal::Modal,
     notices::Notices,
     remembered::{Memory, Remembered, WindowFile},
-    save_form::Saving,
     top_bar::{edge_ui, top_bar_ui, widths_points},
 };
 use crate::{
@@ -19,7 +18,7 @@ use crate::{
     window::{
         job::{Background, Wake},
         preview::PreviewEvent,
-        shared::{Command, Effect, Matter, Notice, RunsWorker, Shared, ViewKind, training_status},
+        shared::{Command, Effect, Matter, Notice, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
         theme::{self, Theme, space},
         training_worker::{Request, Worker},
         views::Views,
@@ -33,8 +32,6 @@ pub struct DecouplerWindow {
     pub(super) notices: Notices,
     /// The card over the window that must be answered first.
     pub(super) modal: Option<Modal>,
-    /// The path last typed, offered again for the same file.
-    pub(super) typed: Option<Saving>,
     /// The checkpoint that the training of the Train view was opened from.
     pub(super) opened: Option<PathBuf>,
     pub(super) worker: Worker,
@@ -99,14 +96,13 @@ impl DecouplerWindow {
             views,
             notices: Notices::default(),
             modal: None,
-            typed: None,
             opened: None,
             worker: Worker::start(Arc::clone(&wake)),
             keeping: None,
             previews: Background::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
-            copying: Copying::new(Clipboard::of(desktop), Arc::clone(&wake)),
+            copying: Copying::new(desktop, Arc::clone(&wake)),
             dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
             picked: None,
             undoer: DraftsUndoer::default(),
@@ -130,7 +126,7 @@ impl DecouplerWindow {
     /// the window closes.
     #[must_use]
     pub fn keeping_runs(self, path: PathBuf) -> Self {
-        self.runs.open(path);
+        self.runs.ask(RunsRequest::Open(path));
         self
     }
 
@@ -183,7 +179,7 @@ impl DecouplerWindow {
     pub fn show_ui(&mut self, ui: &mut Ui) {
         // Another window may have changed the run list.
         if ui.input(|input| input.events.contains(&Event::WindowFocused(true))) {
-            self.runs.look();
+            self.runs.ask(RunsRequest::Look);
         }
         let mut effects = Vec::new();
         let offers = self.take_commands(ui.ctx(), &mut effects);

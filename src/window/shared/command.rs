@@ -64,68 +64,49 @@ pub struct About {
 impl Command {
     /// Returns its name, keys and explanation.
     pub fn about(&self) -> About {
-        const PLAIN: Modifiers = Modifiers::NONE;
-        const COMMAND: Modifiers = Modifiers::COMMAND;
+        let plain = |key| Some(KeyboardShortcut::new(Modifiers::NONE, key));
+        let ctrl = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND, key));
+        let shift = Modifiers::COMMAND | Modifiers::SHIFT;
         let (name, keys, hint) = match self {
-            Self::Train => ("Train", Some((COMMAND, Key::Enter)), "Start training a network."),
+            Self::Train => ("Train", ctrl(Key::Enter), "Start training a network."),
             Self::TrainLonger => ("Train longer", None, "Continue from the current weights."),
-            Self::PauseTraining => ("Pause training", Some((COMMAND, Key::P)), ""),
-            Self::ResumeTraining => ("Resume training", Some((COMMAND, Key::P)), ""),
-            Self::StopTraining => (
-                "Stop training",
-                Some((COMMAND, Key::Period)),
-                "End it; the best network is kept.",
-            ),
+            Self::PauseTraining => ("Pause training", ctrl(Key::P), ""),
+            Self::ResumeTraining => ("Resume training", ctrl(Key::P), ""),
+            Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
             Self::OpenFiles => ("Open files", None, "A recording, recipe, network or checkpoint."),
             Self::PressMiddle => ("Press the middle of the surface", None, "Touch the sensor."),
-            Self::NextSample => ("Next test sample", Some((PLAIN, Key::PageDown)), "The next snapshot."),
-            Self::PreviousSample => (
-                "Previous test sample",
-                Some((PLAIN, Key::PageUp)),
-                "The previous snapshot.",
-            ),
+            Self::NextSample => ("Next test sample", plain(Key::PageDown), ""),
+            Self::PreviousSample => ("Previous test sample", plain(Key::PageUp), ""),
             Self::Chart(name) => (*name, None, "Show this chart."),
-            Self::NextSection => ("Next section", Some((PLAIN, Key::CloseBracket)), ""),
-            Self::PreviousSection => ("Previous section", Some((PLAIN, Key::OpenBracket)), ""),
-            Self::SectionAlongColumns => ("Section along a column-wire", Some((PLAIN, Key::Backslash)), ""),
-            Self::SectionAlongRows => ("Section along a row-wire", Some((PLAIN, Key::Backslash)), ""),
-            Self::Begin(name) => (*name, Some((COMMAND, Key::Enter)), "Start."),
-            Self::Cancel(name) => (*name, Some((COMMAND, Key::Period)), "Stop; what has finished is kept."),
-            Self::CrossValidate => ("Cross-validate", None, "Test on every part of the samples in turn."),
-            Self::Record => (
-                "Start or end recording",
-                Some((COMMAND, Key::R)),
-                "Write every frame to a file.",
-            ),
-            Self::ReZero => (
-                "Re-zero",
-                None,
-                "Take the present readings as those of the unloaded sensor.",
-            ),
-            Self::PlayReplay => ("Pause or resume replay", Some((COMMAND, Key::P)), "Play the recording."),
+            Self::NextSection => ("Next section", plain(Key::CloseBracket), ""),
+            Self::PreviousSection => ("Previous section", plain(Key::OpenBracket), ""),
+            Self::SectionAlongColumns => ("Section along a column-wire", plain(Key::Backslash), ""),
+            Self::SectionAlongRows => ("Section along a row-wire", plain(Key::Backslash), ""),
+            Self::Begin(name) => (*name, ctrl(Key::Enter), "Start."),
+            Self::Cancel(name) => (*name, ctrl(Key::Period), "Stop; what has finished is kept."),
+            Self::CrossValidate => ("Cross-validate", None, "Test on every part of the samples."),
+            Self::Record => ("Start or end recording", ctrl(Key::R), "Write each frame to a file."),
+            Self::ReZero => ("Re-zero", None, "Take the present readings as those at rest."),
+            Self::PlayReplay => ("Pause or resume replay", ctrl(Key::P), ""),
             Self::Export(name) => (name.as_str(), None, ""),
-            Self::Undo => ("Undo change of settings", Some((COMMAND, Key::Z)), ""),
+            Self::Undo => ("Undo change of settings", ctrl(Key::Z), ""),
             Self::Redo => (
                 "Redo change of settings",
-                Some((COMMAND | Modifiers::SHIFT, Key::Z)),
+                Some(KeyboardShortcut::new(shift, Key::Z)),
                 "",
             ),
-            Self::Show(view) => (view.name(), Some((COMMAND, view.key())), "Show this view."),
+            Self::Show(view) => (view.name(), ctrl(view.key()), "Show this view."),
             Self::Dark => ("Dark theme", None, ""),
             Self::Light => ("Light theme", None, ""),
             Self::Colours(map) => (map.name(), None, map.meaning()),
-            Self::LockHeights => (
-                "Lock the scale of heights",
-                None,
-                "Colours mean the same on every surface.",
-            ),
+            Self::LockHeights => ("Lock the scale of heights", None, "The same colours on every surface."),
             Self::FreeHeights => ("Free the scale of heights", None, "Colours span the displayed heights."),
             Self::FreeErrors => ("Free the scale of errors", None, "Colours span the displayed errors."),
-            Self::Larger => ("Larger interface", Some((COMMAND, Key::Plus)), "Zoom in."),
-            Self::Smaller => ("Smaller interface", Some((COMMAND, Key::Minus)), "Zoom out."),
-            Self::UsualSize => ("Reset the interface size", Some((COMMAND, Key::Num0)), "Zoom to 100 %."),
-            Self::Search => ("Search actions", Some((COMMAND, Key::K)), ""),
-            Self::Keys => ("Keys", Some((PLAIN, Key::Questionmark)), "Help: every shortcut."),
+            Self::Larger => ("Larger interface", ctrl(Key::Plus), "Zoom in."),
+            Self::Smaller => ("Smaller interface", ctrl(Key::Minus), "Zoom out."),
+            Self::UsualSize => ("Reset the interface size", ctrl(Key::Num0), "Zoom to 100 %."),
+            Self::Search => ("Search actions", ctrl(Key::K), ""),
+            Self::Keys => ("Keys", plain(Key::Questionmark), "Help: every shortcut."),
             Self::Glossary => ("Glossary", None, "Help: every term."),
             Self::About => ("About Decoupler", None, "Version and licences."),
         };
@@ -137,7 +118,7 @@ impl Command {
         };
         About {
             name: format!("{before}{name}"),
-            keys: keys.map(|(modifiers, key)| KeyboardShortcut::new(modifiers, key)),
+            keys,
             hint,
         }
     }

@@ -173,20 +173,16 @@ impl<'a> Shown<'a> {
             (Item::Network(source), _) => source.network_file(),
             (Item::Report(source, decoders), _) => source.report(decoders.clone()),
             (Item::Figure(_, figure), Format::Picture) => {
-                return Some(Effect::CopyPicture {
-                    figure: Box::new(figure()),
-                    notice: format!("Copied the {name} as a picture"),
-                });
+                let picture = ToCopy::Picture(Box::new(figure()));
+                return Some(Effect::Copy(picture, format!("Copied the {name} as a picture")));
             }
             (Item::Figure(stem, figure), _) => {
                 let figure = figure();
                 FileTask::save(format.words(), stem, move |path| figure.draw().save(path))
             }
             (Item::Table(_, table), Format::Copy(form)) => {
-                return Some(Effect::Copy {
-                    text: table().text(form),
-                    notice: format!("Copied the {name} as {form}"),
-                });
+                let text = ToCopy::Text(table().text(form));
+                return Some(Effect::Copy(text, format!("Copied the {name} as {form}")));
             }
             (Item::Table(stem, table), _) => {
                 let (table, saved) = (table(), self.saved.clone());
@@ -250,25 +246,17 @@ impl Format {
     /// Returns words for its file, or its description for a copy.
     pub fn words(self) -> FileWords {
         let (kind, description, extensions): (_, _, &[_]) = match self {
-            Self::Bundle(BundleFormat::Onnx) => (
-                "ONNX graph",
-                "A folder with the decoder as an ONNX graph (opset 13) and golden readings: readings in, targets out.",
-                &[],
-            ),
-            Self::Bundle(BundleFormat::C99) => (
-                "C99 program",
-                "A folder with one header and one source in C99 and a self-test: readings in, targets out. fixed16 uses \
-                 integer arithmetic only, for microcontrollers.",
-                &[],
-            ),
-            Self::Bundle(BundleFormat::Matlab) => (
-                "function for MATLAB and Octave",
-                "A folder with one function file for MATLAB and GNU Octave and golden readings: readings in, targets out.",
-                &[],
-            ),
-            Self::Bundle(BundleFormat::NumPy) => (
-                "program for NumPy",
-                "A folder with the weights as .npz, a short decode.py and golden readings: readings in, targets out.",
+            Self::Bundle(format) => (
+                format.title(),
+                match format {
+                    BundleFormat::Onnx => "A folder with an ONNX graph (opset 13) and golden readings.",
+                    BundleFormat::C99 => {
+                        "A folder with one header and one source in C99 and a self-test. fixed16 uses \
+                                          integer arithmetic only, for microcontrollers."
+                    }
+                    BundleFormat::Matlab => "A folder with one function for MATLAB and GNU Octave and golden readings.",
+                    BundleFormat::NumPy => "A folder with the weights, a short decode.py and golden readings.",
+                },
                 &[],
             ),
             Self::NetworkFile => (
@@ -295,17 +283,14 @@ impl Format {
             ),
             Self::Picture => ("picture", "As shown, on a light background: pixels at 300 dpi.", &[]),
             Self::Csv => ("table", "With every digit.", &["csv"]),
-            Self::Copy(TableForm::Markdown) => ("table", "Numbers with three significant digits.", &[]),
-            Self::Copy(TableForm::Latex) => (
+            Self::Copy(form) => (
                 "table",
-                "For the packages booktabs and siunitx: numbers with three significant digits, aligned at the decimal \
-                 point.",
-                &[],
-            ),
-            Self::Copy(TableForm::TabSeparated) => ("table", "Numbers with every digit, for spreadsheets.", &[]),
-            Self::Copy(TableForm::Json) => (
-                "table",
-                "An array with an object for each row, numbers with every digit.",
+                match form {
+                    TableForm::Markdown => "Numbers with three significant digits.",
+                    TableForm::Latex => "For booktabs and siunitx: numbers with three significant digits.",
+                    TableForm::TabSeparated => "Numbers with every digit, for spreadsheets.",
+                    TableForm::Json => "An array with an object for each row, numbers with every digit.",
+                },
                 &[],
             ),
             Self::Own(words) => return words,
@@ -316,6 +301,15 @@ impl Format {
             extensions,
         }
     }
+}
+
+/// Something to be copied.
+#[derive(Clone, Debug)]
+pub enum ToCopy {
+    /// Text as it is.
+    Text(String),
+    /// A picture, still to be drawn.
+    Picture(Box<Figure>),
 }
 
 /// An export that the user chooses in a dialog.
@@ -464,11 +458,6 @@ impl FileTask {
         }
     }
 
-    /// Returns true if `other` asks for the same file.
-    pub fn is_same_file(&self, other: &Self) -> bool {
-        (self.words, &self.suggestion) == (other.words, &other.suggestion)
-    }
-
     /// Returns true if the file is read, not written.
     pub fn is_read(&self) -> bool {
         !matches!(self.purpose, Purpose::Save(_))
@@ -578,25 +567,22 @@ impl NetworkSource {
     }
 
     fn bundle(&self, decoder: BundleDecoder, format: BundleFormat, precision: BundlePrecision) -> FileTask {
+        let what = if decoder.is_network() {
+            format!("{format}-{precision}")
+        } else {
+            format!("{decoder}-{format}-{precision}")
+        };
         let words = Format::Bundle(format).words();
         let write = move |exported: Result<ExportedDecoder, BundleError>, path: &Path| {
             let report = exported.and_then(|exported| export_bundle(exported, format, precision, &free_path(path)));
             report.map(|report| said_of(&report)).map_err(|error| error.to_string())
         };
-        if decoder.is_network() {
-            return self.task((words, &format!("{format}-{precision}")), move |file, _| {
-                Box::new(move |path| write(Ok(ExportedDecoder::from(&*file)), path))
-            });
-        }
-        let what = format!("{decoder}-{format}-{precision}");
         let Self::Samples(setup, recorded) = self else {
             return self.task((words, &what), move |file, _| {
                 Box::new(move |path| {
-                    let exported = samples(&file.setup());
-                    write(
-                        exported.and_then(|sets| ExportedDecoder::of_run(&file, sets, decoder)),
-                        path,
-                    )
+                    let of_samples = || ExportedDecoder::of_run(&file, samples(&file.setup())?, decoder);
+                    let of_file = decoder.is_network().then(|| Ok(ExportedDecoder::from(&*file)));
+                    write(of_file.unwrap_or_else(of_samples), path)
                 })
             });
         };
@@ -673,4 +659,26 @@ pub fn file_stem(what: &str, setup: &Setup) -> String {
         starts => format!("-starts{starts}"),
     };
     format!("{what}-{source}-h{hidden}-{method}{starts}-seed{}", settings.seed)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_taken_is_followed_by_the_next_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        assert_eq!(free_path(&at("loss.csv")), at("loss.csv"));
+        for name in ["loss.csv", "loss-2.csv", "net/file"] {
+            fs::create_dir_all(at(name).parent().unwrap()).unwrap();
+            fs::write(at(name), "").unwrap();
+        }
+        assert_eq!(free_path(&at("loss.csv")), at("loss-3.csv"));
+        assert_eq!(free_path(&at("net")), at("net-2"));
+        fs::create_dir(at("net-2")).unwrap();
+        assert_eq!(free_path(&at("net")), at("net-2"), "an empty folder is free");
+    }
 }

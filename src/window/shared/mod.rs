@@ -13,14 +13,15 @@ mod training_form;
 mod view;
 
 pub use super::training_worker::RunResult;
-pub use command::{Command, Offer, Offers};
+pub use command::{About, Command, Offer, Offers};
 pub use error_table::error_table_ui;
 pub use export::{
-    ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, file_stem, saying_saved,
+    ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, ToCopy, file_stem,
+    saying_saved,
 };
 pub use look::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 pub use offers::{FileInUse, refuse_in_use};
-pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
+pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
 pub use run_view::{RunView, run_buttons_ui, sentence, training_status};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
 pub use training_form::{Effect, Matter, Notice};

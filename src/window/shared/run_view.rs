@@ -143,9 +143,7 @@ impl RunView {
         append_epochs(&mut self.history, epochs);
         self.stages = stages;
         self.past = past;
-        if let Some(starts) = starts {
-            self.starts = starts;
-        }
+        self.starts = starts;
         self.result = Some(result);
     }
 
@@ -188,7 +186,7 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         (false, SourceKind::Recording) => "Reads the recording and trains the network",
         (true, SourceKind::Recording) => "Starts again: reads the recording and trains the network",
     };
-    let train = ui.add_enabled(shared.can_train(), primary_button("▶ Train"));
+    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
     if train.on_hover_text(with_shortcut(ui, hint, Key::Enter)).clicked() {
         effects.push(Effect::Train);
     }
@@ -252,7 +250,6 @@ fn phase_in_words(shared: &Shared) -> Status {
             return Status::new(Tone::Good, format!("Finished: {reason}"));
         }
         Phase::Ended(reason) => return Status::new(Tone::Bad, format!("Ended: {reason}")),
-        Phase::Died => (Tone::Bad, "The training thread ended unexpectedly"),
     };
     Status::new(tone, text)
 }

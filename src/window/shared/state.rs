@@ -120,8 +120,6 @@ pub enum Phase {
     Calibrating,
     /// Ended, and why.
     Ended(StopReason),
-    /// The worker is gone.
-    Died,
 }
 
 impl Phase {
@@ -239,11 +237,6 @@ impl Shared {
     pub fn phase_at_rest(&self) -> Phase {
         let ended = self.run.as_ref().and_then(|run| run.stop_reason);
         ended.map_or(Phase::Idle, Phase::Ended)
-    }
-
-    /// Returns true if a training can begin, as far as the worker is concerned.
-    pub fn can_train(&self) -> bool {
-        !self.phase.is_busy() && self.phase != Phase::Died
     }
 
     /// Returns true if the current training can continue from its present weights with the draft: its sets and networks

@@ -3,11 +3,10 @@ use std::{path::PathBuf, sync::Arc};
 use decoupler_core::{evaluation::RunSettings, training::TrainerState};
 use decoupler_files::{
     export::NetworkFile,
-    figure::Figure,
     import::{Plan, Setup},
 };
 
-use super::{Exporting, FileTask, Look, SourceKind};
+use super::{Exporting, FileTask, Look, SourceKind, ToCopy};
 
 /// Request of a view to the window, which applies all of them in one place once everything is drawn.
 #[derive(Clone, Debug)]
@@ -42,26 +41,12 @@ pub enum Effect {
     Continue,
     /// Set the look of all surfaces.
     Look(Look),
-    /// Decode this snapshot in the results to come.
-    Watch(usize),
     /// Ask for the path of a file.
     ChooseFile(FileTask),
     /// Let the user choose the form of an export.
     Export(Box<Exporting>),
-    /// Put this text on the clipboard.
-    Copy {
-        /// The text.
-        text: String,
-        /// Message for the user.
-        notice: String,
-    },
-    /// Put this picture on the clipboard.
-    CopyPicture {
-        /// The picture.
-        figure: Box<Figure>,
-        /// Message for the user.
-        notice: String,
-    },
+    /// Put this on the clipboard; then the text tells the user.
+    Copy(ToCopy, String),
     /// Keep the run of a network file that was opened.
     KeepRun(Box<NetworkFile>),
     /// Rename the kept run with this number.

@@ -1,10 +1,9 @@
 use std::{
     cell::Cell,
-    fmt,
     path::PathBuf,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
+        atomic::{AtomicU64, Ordering},
         mpsc::{Sender, channel},
     },
     time::Duration,
@@ -29,11 +28,10 @@ use ndarray::Array2;
 use super::{calibration::Calibration, keeping::Keeping, past_networks::PastNetworks, training_loop::TrainingLoop};
 use crate::window::{
     job::{Background, JobError, Wake},
-    test_view::{Frame, TargetCharts, TestSet},
+    test_view::{TargetCharts, TestSet},
 };
 
 /// Request from the window to the worker.
-#[derive(Debug)]
 pub enum Request {
     /// Begin a training; one in progress is discarded.
     Begin(RunId, Origin),
@@ -104,10 +102,8 @@ pub enum Event {
     Died(Option<JobError>),
 }
 
-/// Function called with a training, or with the reason why it is not available.
-pub struct Inspection(Box<Inspect>);
-
-type Inspect = dyn FnOnce(Result<&TrainedRun, &str>) + Send;
+/// Function called on the thread of the worker with a training, or with the reason why it is not available.
+pub type Inspection = Box<dyn FnOnce(Result<&TrainedRun, &str>) + Send>;
 
 /// Run of the worker, with the origin of recorded samples.
 pub struct TrainedRun {
@@ -121,24 +117,6 @@ pub struct TrainedRun {
     pub of_samples: Vec<String>,
     /// Calibration of its intervals when it has ended; `None` for a simulated array.
     pub calibration: Option<Calibration>,
-}
-
-impl Inspection {
-    /// Wraps `inspect`, which is called on the thread of the worker.
-    pub fn new(inspect: impl FnOnce(Result<&TrainedRun, &str>) + Send + 'static) -> Self {
-        Self(Box::new(inspect))
-    }
-
-    /// Calls the function with `run`.
-    pub(super) fn inspect(self, run: Result<&TrainedRun, &str>) {
-        (self.0)(run);
-    }
-}
-
-impl fmt::Debug for Inspection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Inspection")
-    }
 }
 
 /// Identity of a training, unique also across workers.
@@ -181,8 +159,8 @@ pub struct Progress {
     pub epochs: Vec<EpochRecord>,
     /// Methods of the leading start so far.
     pub stages: Vec<Stage>,
-    /// State of each start, if there are several; sent only occasionally.
-    pub starts: Option<Vec<StartRecord>>,
+    /// State of each start, if there are several.
+    pub starts: Vec<StartRecord>,
     /// Networks of the epochs so far.
     pub past: PastNetworks,
     /// Result so far.
@@ -194,11 +172,10 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Merges in an older report that was not received, so that its epochs and the states of its starts are not lost.
+    /// Merges in an older report that was not received, so that its epochs are not lost.
     pub fn replace(&mut self, older: Self) {
         let newer = std::mem::replace(&mut self.epochs, older.epochs);
         append_epochs(&mut self.epochs, newer);
-        self.starts = self.starts.take().or(older.starts);
     }
 }
 
@@ -219,8 +196,6 @@ pub struct RunResult {
     pub charts: Option<Arc<TargetCharts>>,
     /// Remarks on the errors of a recording, when the training is paused or has ended.
     pub remarks: Vec<String>,
-    /// Displayed snapshot and its surface, which is interpolated here to spare the window.
-    pub frame: Option<(usize, Frame)>,
     /// Errors of the decoded values.
     pub errors: TestErrors,
     /// Errors of the network alone, if a combination is used.
@@ -292,8 +267,6 @@ pub struct Worker {
 pub(super) struct Watched {
     /// Number of the training last asked for: the preparations of others are cancelled.
     pub(super) newest: AtomicU64,
-    /// Displayed snapshot.
-    pub(super) snapshot: AtomicUsize,
 }
 
 impl Worker {
@@ -316,13 +289,9 @@ impl Worker {
         }
     }
 
-    /// Returns a worker whose thread panics; `wake` is called afterwards.
-    #[cfg(test)]
-    pub fn dying(wake: Wake) -> Self {
-        let mut dead = Self::start(wake);
-        *dead.requests() = channel().0;
-        dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
-        dead
+    /// Returns true if the thread has ended.
+    pub fn has_died(&self) -> bool {
+        !self.job.is_under_way()
     }
 
     /// Starts another thread after this one has died.
@@ -375,11 +344,6 @@ impl Worker {
         let _ = self.requests().send(request);
     }
 
-    /// Selects the snapshot whose surface is part of later results.
-    pub fn watch(&self, snapshot: usize) {
-        self.watched.snapshot.store(snapshot, Ordering::Relaxed);
-    }
-
     /// Returns true while a training is being prepared and not cancelled.
     pub fn is_preparing(&self) -> bool {
         self.awaited.get().is_some()
@@ -405,6 +369,16 @@ impl Worker {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl Worker {
+        /// Returns a worker whose thread panics; `wake` is called afterwards.
+        pub fn dying(wake: Wake) -> Self {
+            let mut dead = Self::start(wake);
+            *dead.requests() = channel().0;
+            dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
+            dead
+        }
+    }
 
     /// Returns epochs of a start with this error.
     fn epochs(start: f64, numbers: std::ops::Range<usize>) -> Vec<EpochRecord> {

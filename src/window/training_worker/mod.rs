@@ -8,7 +8,7 @@ mod past_networks;
 mod training_loop;
 
 pub use message::{
-    Began, Event, Inspection, Origin, Progress, Request, RunId, RunResult, Start, TrainedRun, Worker, append_epochs,
+    Began, Event, Origin, Progress, Request, RunId, RunResult, Start, TrainedRun, Worker, append_epochs,
 };
 pub use past_networks::PastNetworks;
 pub use training_loop::LOST;

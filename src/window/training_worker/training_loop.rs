@@ -46,9 +46,6 @@ use crate::window::{
 /// responsive, even if frames are drawn without a graphics card.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Minimum time between two evaluations of all starts, each of which decodes the test set.
-const STARTS_INTERVAL: Duration = Duration::from_millis(500);
-
 /// State of the thread.
 pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
@@ -72,7 +69,6 @@ struct Training {
     /// Start of the last report, and its number of reported epochs.
     reported: (usize, usize),
     next_report: Instant,
-    next_starts: Instant,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -130,11 +126,11 @@ impl<'a> TrainingLoop<'a> {
             }
             (Request::Pause | Request::Resume | Request::Stop, _) => {}
             (Request::Inspect(id, inspection), Some(current)) if current.id == id => {
-                inspection.inspect(Ok(&current.trained));
+                inspection(Ok(&current.trained));
             }
-            (Request::Inspect(_, inspection), Some(_)) => inspection.inspect(Err(REPLACED)),
+            (Request::Inspect(_, inspection), Some(_)) => inspection(Err(REPLACED)),
             // The window offers no export before the first training, so a training was lost.
-            (Request::Inspect(_, inspection), None) => inspection.inspect(Err(LOST)),
+            (Request::Inspect(_, inspection), None) => inspection(Err(LOST)),
             (Request::Keep(folder, interval), _) => match self.keeping.open(&folder, interval) {
                 Ok(left) => {
                     self.left = left;
@@ -197,7 +193,6 @@ impl<'a> TrainingLoop<'a> {
                     no_intervals: None,
                     reported: (0, 0),
                     next_report: Instant::now(),
-                    next_starts: Instant::now(),
                 });
                 self.report.send(Event::Began(id, start, Ok(Box::new(began))));
                 self.publish();
@@ -308,9 +303,7 @@ impl<'a> TrainingLoop<'a> {
         let is_cancelled = || {
             while pending.borrow().is_none() {
                 match requests.try_recv() {
-                    Ok(Request::Inspect(id, inspection)) if current.id == id => {
-                        inspection.inspect(Ok(&current.trained))
-                    }
+                    Ok(Request::Inspect(id, inspection)) if current.id == id => inspection(Ok(&current.trained)),
                     Ok(Request::Save(done)) => {
                         self.keeping.save(&current.trained.run);
                         let _ = done.send(());
@@ -356,7 +349,7 @@ impl<'a> TrainingLoop<'a> {
     /// Reports the progress of the training.
     fn publish(&mut self) {
         let Some(current) = &mut self.current else { return };
-        let progress = current.progress(self.watched.snapshot.load(Ordering::Relaxed));
+        let progress = current.progress();
         self.report
             .progress(Event::Progressed(Box::new(progress)), |older, newer| {
                 if let (Event::Progressed(older), Event::Progressed(newer)) = (older, newer) {
@@ -374,7 +367,7 @@ impl Training {
     }
 
     /// Returns its state, with the epochs since the last report.
-    fn progress(&mut self, watched: usize) -> Progress {
+    fn progress(&mut self) -> Progress {
         let begun = Instant::now();
         let run = &self.trained.run;
         let leader = run.leader_number();
@@ -383,21 +376,13 @@ impl Training {
         let answers = run.decouple_test();
         let errors = run.errors_of(&answers);
         let network_alone = run.scores().and_then(|scores| scores.network_alone);
-        let frame = self.test.array().map(|test| {
-            let snapshot = test.nearest_snapshot(watched);
-            (snapshot, test.frame(answers.view(), snapshot))
-        });
         let charts = self.test.recording().map(|test| Arc::new(test.charts(&answers)));
+        let has_several = run.trainers().len() > 1;
+        let starts = if has_several { run.starts() } else { Vec::new() };
         let cost = begun.elapsed();
         let is_calibrating = self.stage == Stage::Calibrating;
         let stop_reason = run.stop_reason().filter(|_| !is_calibrating);
         let is_idle = self.stage == Stage::Paused || stop_reason.is_some();
-        let has_starts = run.trainers().len() > 1 && (is_idle || begun >= self.next_starts);
-        let starts = has_starts.then(|| run.starts());
-        if has_starts {
-            // Uses at most a tenth of the time.
-            self.next_starts = Instant::now() + STARTS_INTERVAL.max(9 * (begun.elapsed() - cost));
-        }
         let reported = if self.reported.0 == leader { self.reported.1 } else { 0 };
         let frame_time = is_idle
             .then(|| frame_us(&mut networks.decoder(), run.test()).ok())
@@ -409,13 +394,13 @@ impl Training {
             starts,
             past: self.past.clone(),
             result: RunResult {
-                remarks: is_idle
-                    .then(|| self.remarks(&answers, &errors))
-                    .flatten()
-                    .unwrap_or_default(),
+                remarks: if is_idle {
+                    self.remarks(&answers, &errors)
+                } else {
+                    Vec::new()
+                },
                 answers: Arc::new(answers),
                 charts,
-                frame,
                 errors,
                 network_alone,
                 coverage: run.coverage().to_vec(),
@@ -438,11 +423,13 @@ impl Training {
     }
 
     /// Returns the remarks on the decoded test samples of a recording.
-    fn remarks(&self, answers: &Array2<f64>, errors: &TestErrors) -> Option<Vec<String>> {
+    fn remarks(&self, answers: &Array2<f64>, errors: &TestErrors) -> Vec<String> {
         let run = &self.trained.run;
-        let by = self.trained.recorded.as_ref()?.plan.division.by;
+        let Some(recorded) = &self.trained.recorded else {
+            return Vec::new();
+        };
         let (targets, has_combined) = (&run.problem().targets, run.combined().is_some());
-        let determined = Determination::measure(run.test(), answers.view(), by);
+        let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
         let mut remarks = self.trained.of_samples.clone();
         remarks.extend(describe_determinacy(targets, &determined, has_combined));
         if let Some(baselines) = run.baselines() {
@@ -456,7 +443,7 @@ impl Training {
         }
         remarks.extend(describe_coverage(targets, run.coverage()));
         remarks.extend(self.no_intervals.clone());
-        Some(remarks)
+        remarks
     }
 }
 

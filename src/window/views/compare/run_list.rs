@@ -9,7 +9,7 @@ use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Ro
 
 use super::figures::named_settings;
 use crate::window::{
-    shared::{Effect, PLACES, Phase, Shared},
+    shared::{Effect, PLACES, Shared},
     theme::{space, type_size},
     widgets::{dim_ui, ghost_button, scrolled_ui, section_heading_ui},
 };
@@ -22,7 +22,7 @@ pub(super) fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u6
         if runs.workspace.runs.is_empty() {
             dim_ui(ui, "Every finished training is kept here, with its network.");
             ui.add_space(space(2));
-            let can_train = !shared.phase.is_busy() && shared.phase != Phase::Died;
+            let can_train = !shared.phase.is_busy();
             if ui.add_enabled(can_train, ghost_button("Train a network now")).clicked() {
                 effects.extend([Effect::ShowTraining, Effect::Train]);
             }

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use crate::window::{
     job::{Background, Wake},
     shared::{LoadedRun, sentence},
-    test_view::{Positions, RecordedTest, TestSet, TestView},
+    test_view::{RecordedTest, TestSet, TestView},
 };
 
 /// One side of the comparison.
@@ -62,7 +62,8 @@ impl Side {
     /// Draws the surfaces of a snapshot, or of the last one if there are fewer.
     pub(super) fn show(&mut self, snapshot: usize) {
         if let Some(Ok(compared)) = &mut self.compared {
-            compared.surfaces = surfaces(&compared.test, &compared.answers, snapshot);
+            let drawing = compared.test.drawing(Some(&compared.answers), snapshot);
+            compared.surfaces = drawing.and_then(|drawing| drawing.decoded);
         }
     }
 
@@ -131,26 +132,5 @@ impl Compared {
             test,
             answers,
         })
-    }
-}
-
-/// Returns the decoded surface of `snapshot`, or of the last one if there are fewer, and its error; `None` if there is no
-/// surface through the targets.
-fn surfaces(test: &TestSet, answers: &Array2<f64>, snapshot: usize) -> Option<[Surface; 2]> {
-    let snapshot = snapshot.min(test.snapshots().saturating_sub(1));
-    match test {
-        TestSet::Array(test) => {
-            let [actual, decoded] = [test.set.targets(), answers.view()].map(|values| test.frame(values, snapshot));
-            let error = test.errors("", &actual.error_of(&decoded));
-            Some([test.heights("", &decoded), error])
-        }
-        TestSet::Recording(test) => {
-            let Positions::Surface(through) = &test.positions else {
-                return None;
-            };
-            let [actual, decoded] = [test.set.targets(), answers.view()].map(|values| values.row(snapshot).to_vec());
-            let [_, decoded, error] = through.surfaces(&actual, &decoded, through.range_of(&test.ranges));
-            Some([decoded, error])
-        }
     }
 }

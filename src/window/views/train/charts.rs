@@ -16,7 +16,7 @@ use super::{
 };
 use crate::window::{
     plotting::{Pointer, cells_ui, plots_ui},
-    shared::{Command, Effect, Offers, Phase, RunResult, RunView, Shared, SourceKind, target_choice_ui},
+    shared::{Command, Effect, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
     test_view::{Positions, TargetCharts},
     theme::{Theme, space},
     widgets::{invitation_ui, tabs_ui},
@@ -153,10 +153,10 @@ const ERROR_MAP: Chart = Chart {
     name: "Error map",
     is_offered: |shared| {
         let charts = shared.result().and_then(|result| result.charts.as_ref());
-        charts.is_some_and(|charts| charts.error_map.is_ok())
+        charts.is_some_and(|charts| charts.error_map.is_some())
     },
     draw: |view, shared| {
-        let map = target_charts(view, shared)?.error_map.as_ref().ok()?;
+        let map = target_charts(view, shared)?.error_map.as_ref()?;
         Some(HeatMap::clone(map).coloured(shared.look.colours).into())
     },
     ..BARE
@@ -167,10 +167,10 @@ pub(super) const NODES: Chart = Chart {
     name: "Nodes",
     draw: |view, shared| {
         let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
-        let frames = view.frames();
-        let decoded_mm = frames.decoupled.as_ref().map(|(decoded, _)| &*decoded.nodes_mm);
+        let drawing = view.drawing()?;
+        let decoded_mm = drawing.decoded.as_ref().map(|[decoded, _]| &*decoded.nodes);
         let bars_mm = view.has_error_bars.then(|| view.drawn.spread_mm()).flatten();
-        Some(node_figure(&frames.actual.nodes_mm, decoded_mm, bars_mm, nodes_per_row).into())
+        Some(node_figure(&drawing.actual.nodes, decoded_mm, bars_mm, nodes_per_row).into())
     },
     items: Items::Nodes,
     bar_ui: |ui, view, shared| {
@@ -184,7 +184,7 @@ pub(super) const NODES: Chart = Chart {
 
 pub(super) const SECTION: Chart = Chart {
     name: "Section",
-    draw: |view, shared| Some(section_of(&view.section, shared.test()?, view.frames(), shared.look).into()),
+    draw: |view, shared| Some(section_of(&view.section, shared.test()?, view.drawing()?, shared.look).into()),
     items: Items::Nodes,
     bar_ui: |ui, view, shared| {
         if let Some(test) = shared.test() {
@@ -325,9 +325,9 @@ fn lit_value(view: &TrainView, shared: &Shared) -> Option<[f64; 2]> {
         let answers = &view.result(shared)?.answers;
         return Some([*test.set.targets().get(at)?, *answers.get(at)?]);
     }
-    let (frames, node) = (view.frames(), view.lights.node?);
-    let (decoded, _) = frames.decoupled.as_ref()?;
-    Some([frames.actual.nodes_mm.get(node)?.z, decoded.nodes_mm.get(node)?.z])
+    let (drawing, node) = (view.drawing()?, view.lights.node?);
+    let [decoded, _] = drawing.decoded.as_ref()?;
+    Some([drawing.actual.nodes.get(node)?.z, decoded.nodes.get(node)?.z])
 }
 
 /// Returns the nodes of the row-wire that is pointed at, which are lit together.
@@ -382,7 +382,7 @@ pub fn charts_card_ui(
         place.max.y -= scrub::HEIGHT;
     }
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
-        let is_possible = !shared.phase.is_busy() && shared.phase != Phase::Died;
+        let is_possible = !shared.phase.is_busy();
         if chart.name == READINGS.name {
             readings_of_view_ui(ui, view, shared);
         } else if let Some(figure) = chart.figure(view, shared) {

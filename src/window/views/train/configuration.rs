@@ -8,7 +8,10 @@ use decoupler_core::{
 };
 use eframe::egui::{Button, Ui};
 
-use super::{exports::PaperFigure, recording::RecordingEditor};
+use super::{
+    exports::{PAPER_FIGURES, PaperFigure},
+    recording::RecordingEditor,
+};
 use crate::window::{
     forms::{self, Fields, SetBy},
     glossary,
@@ -32,7 +35,7 @@ pub fn configuration_ui(
     scrolled_ui(ui, "configuration", |ui| {
         ui.add_space(space(2));
         ui.add_enabled_ui(!shared.phase.is_busy(), |ui| {
-            source_choice_ui(ui, shared.source, effects)
+            source_choice_ui(ui, shared.source, effects);
         });
         ui.add_space(space(2));
         let mut fields = Fields::new(&mut settings);
@@ -114,7 +117,7 @@ fn settings_ui(
     ui.add_enabled_ui(is_open, |ui| forms::training_ui(ui, fields, is_new));
     let mut picked = None;
     if !is_recording {
-        ui.add_enabled_ui(is_new && phase != Phase::Died, |ui| {
+        ui.add_enabled_ui(is_new, |ui| {
             fold_ui(ui, "Figures of the paper", "", |ui| picked = paper_figures_ui(ui));
         });
     }
@@ -183,9 +186,9 @@ fn paper_figures_ui(ui: &mut Ui) -> Option<PaperFigure> {
     let width = 0.5 * (ui.available_width() - space(1));
     ui.spacing_mut().item_spacing = [space(1); 2].into();
     ui.horizontal_wrapped(|ui| {
-        for figure in PaperFigure::ALL {
-            let button = ghost_button(figure.name()).min_size([width, space(7)].into());
-            if ui.add(button).on_hover_text(figure.description()).clicked() {
+        for figure in PAPER_FIGURES {
+            let button = ghost_button(figure.name).min_size([width, space(7)].into());
+            if ui.add(button).on_hover_text(figure.description).clicked() {
                 picked = Some(figure);
             }
         }

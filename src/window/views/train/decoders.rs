@@ -164,72 +164,56 @@ fn measure_all(setup: &Setup, problem: &Problem, networks: Networks, test: &Data
     }
 }
 
-/// A column of the table: its heading and meaning, and the figure of a decoder and of the model-based errors. The figure
-/// takes the report, the model-based errors and the displayed target.
+/// A column of the table: its heading and meaning, and the figure of a decoder next to the model-based errors and for the
+/// displayed target.
+#[derive(Clone, Copy)]
 struct Figure {
     heading: &'static str,
-    meaning: &'static str,
+    meaning: fn() -> &'static str,
     value: fn(&DecoderReport, Option<&Errors>, usize) -> Option<f64>,
-    of_model_based: fn(&Errors) -> Option<f64>,
 }
 
 const PERCENT: Figure = Figure {
     heading: "Z %",
-    meaning: glossary::Z_PERCENT.hint,
+    meaning: || glossary::Z_PERCENT.hint,
     value: |report, _, _| report.errors.percent(),
-    of_model_based: |errors| errors.z_percent,
 };
 
 const TIMES: Figure = Figure {
     heading: "× model-based",
-    meaning: "Mean |error| of z divided by that of the model-based decoder in this scene.",
+    meaning: || "Mean |error| of z divided by that of the model-based decoder in this scene.",
     value: |report, model_based, _| report.errors.nodes()?.times(model_based?),
-    of_model_based: |_| Some(1.0),
 };
 
 const RESIDUAL: Figure = Figure {
     heading: "residual",
-    meaning: glossary::RESIDUAL.hint,
+    meaning: || glossary::RESIDUAL.hint,
     value: |report, _, _| report.residual,
-    of_model_based: |_| None,
 };
 
-const R2: &str = "R²";
+const RANGE_PERCENT: Figure = Figure {
+    heading: "% of range",
+    meaning: || "Mean absolute error in percent of the range, averaged over all targets that vary.",
+    ..PERCENT
+};
+
+const RMSE: Figure = Figure {
+    heading: "RMSE",
+    meaning: || ErrorMeasure::Rmse.definition(),
+    value: |report, _, target| Some(report.errors.targets().get(target)?.rmse),
+};
+
+const R2: Figure = Figure {
+    heading: "R²",
+    meaning: || ErrorMeasure::R2.definition(),
+    value: |report, _, target| report.errors.targets().get(target)?.r2,
+};
 
 const FRAME_TIME: Figure = Figure {
     heading: "µs",
-    meaning: "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
+    meaning: || "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
     value: |report, _, _| Some(report.frame_us),
-    of_model_based: |_| None,
 };
-
-/// Returns the columns for this problem, from left to right.
-fn figures(problem: &Problem, has_model_based: bool) -> Vec<Figure> {
-    match (problem.has_nodes(), has_model_based) {
-        (true, true) => vec![PERCENT, TIMES, RESIDUAL, FRAME_TIME],
-        (true, false) => vec![PERCENT, RESIDUAL, FRAME_TIME],
-        (false, _) => vec![
-            Figure {
-                heading: "% of range",
-                meaning: "Mean absolute error in percent of the range, averaged over all targets that vary.",
-                ..PERCENT
-            },
-            Figure {
-                heading: "RMSE",
-                meaning: ErrorMeasure::Rmse.definition(),
-                value: |report, _, target| Some(report.errors.targets().get(target)?.rmse),
-                ..RESIDUAL
-            },
-            Figure {
-                heading: R2,
-                meaning: ErrorMeasure::R2.definition(),
-                value: |report, _, target| report.errors.targets().get(target)?.r2,
-                ..RESIDUAL
-            },
-            FRAME_TIME,
-        ],
-    }
-}
 
 /// The other decoders on the same test set, folded away until the user asks for them, next to the `model_based`
 /// errors. `target` is the target whose errors are shown for a recording. Each decoder can be exported with
@@ -237,7 +221,6 @@ fn figures(problem: &Problem, has_model_based: bool) -> Vec<Figure> {
 pub fn decoders_ui(
     ui: &mut Ui,
     decoders: &mut Decoders,
-    phase: Phase,
     (problem, model_based): (&Problem, Option<&Errors>),
     target: &mut usize,
     source: Option<&NetworkSource>,
@@ -246,12 +229,9 @@ pub fn decoders_ui(
     ui.add_space(space(1));
     let header = CollapsingHeader::new("More decoders")
         .open(Some(decoders.is_open))
-        .show(ui, |ui| match (&decoders.measured, phase) {
-            (Some(measured), _) => asked = measured_ui(ui, measured, (problem, model_based), target, source),
-            (None, Phase::Died) => {
-                dim_ui(ui, "The network was lost with the training thread: train again.");
-            }
-            (None, _) => {
+        .show(ui, |ui| match &decoders.measured {
+            Some(measured) => asked = measured_ui(ui, measured, (problem, model_based), target, source),
+            None => {
                 dim_ui(ui, "They are measured when the training is paused or has ended.");
             }
         });
@@ -282,14 +262,16 @@ fn measured_ui(
         target_choice_ui(ui, "RMSE and R² of", "target of the decoders", &problem.targets, target);
     }
     let target = (*target).min(problem.targets.len().saturating_sub(1));
-    let mut figures = figures(problem, model_based.is_some());
-    // In a narrow window the buttons at the end come first.
-    if ui.available_width() < space(80) {
-        figures.retain(|figure| figure.heading != R2);
-    }
+    let figures = match (problem.has_nodes(), model_based) {
+        (true, Some(_)) => vec![PERCENT, TIMES, RESIDUAL, FRAME_TIME],
+        (true, None) => vec![PERCENT, RESIDUAL, FRAME_TIME],
+        // In a narrow window the buttons at the end come first.
+        (false, _) if ui.available_width() < space(80) => vec![RANGE_PERCENT, RMSE, FRAME_TIME],
+        (false, _) => vec![RANGE_PERCENT, RMSE, R2, FRAME_TIME],
+    };
     let headings = figures
         .iter()
-        .map(|figure| TableColumn::figure(figure.heading).meaning(figure.meaning));
+        .map(|figure| TableColumn::figure(figure.heading).meaning((figure.meaning)()));
     let mut columns = vec![TableColumn::text("")];
     columns.extend(headings);
     columns.push(TableColumn::text("").width(ColumnWidth::Points(space(7))));
@@ -299,7 +281,7 @@ fn measured_ui(
             None => "…".to_owned(),
             Some(Err(_)) => format_number(None),
             Some(Ok(report)) => match (figure.value)(report, model_based, target) {
-                value if figure.heading == R2 => format_r2(value),
+                value if figure.heading == R2.heading => format_r2(value),
                 value => format_number(value),
             },
         });
@@ -320,9 +302,11 @@ fn measured_ui(
         })
     });
     let of_model_based = model_based.map(|errors| {
-        let cells = figures
-            .iter()
-            .map(|figure| format_number((figure.of_model_based)(errors)));
+        let cells = figures.iter().map(|figure| match figure.heading {
+            heading if heading == PERCENT.heading => format_number(errors.z_percent),
+            heading if heading == TIMES.heading => format_number(1.0),
+            _ => format_number(None),
+        });
         TableRow::figures("model-based", cells)
             .meaning(glossary::MODEL_BASED.hint)
             .colour(palette.dim)
@@ -414,7 +398,7 @@ mod tests {
         let mut decoders = Decoders::new(Arc::new(|| ()));
         (decoders.is_open, decoders.measured) = (true, Some(measured));
         Harness::new_ui(move |ui| {
-            decoders_ui(ui, &mut decoders, Phase::Idle, (&problem, None), &mut 0, None);
+            decoders_ui(ui, &mut decoders, (&problem, None), &mut 0, None);
         })
     }
 

@@ -1,25 +1,23 @@
-//! What is drawn of a result at a sample of the test set, for both sources.
+//! Drawings of the test set and of the displayed result on it, for both sources.
 
 use std::{cell::OnceCell, sync::Arc};
 
 use decoupler_core::{dataset::Dataset, evaluation::node_rms_mm};
-use decoupler_files::figure::{surface::Surface, value_pairs};
+use decoupler_files::figure::value_pairs;
 use ndarray::Array2;
 
 use crate::window::{
     shared::{RunResult, Shared},
-    test_view::{Frame, Positions},
+    test_view::Drawing,
 };
 
 /// Drawings of the current test set. They are rebuilt only when it, the result, the snapshot or the target changes.
 #[derive(Debug, Default)]
 pub struct Drawn {
-    /// The displayed snapshot.
-    pub frames: Frames,
+    /// The surfaces of the displayed snapshot; `None` where no surface goes through the targets of a recording.
+    pub surfaces: Option<Drawing>,
     /// Drops of its readings below those at rest, in percent: rows read × M4.
     pub drops_percent: Option<Array2<f64>>,
-    /// Surfaces of a sample of a recording, where one goes through its targets: actual, decoded, and their difference.
-    pub target_surfaces: Option<[Surface; 3]>,
     /// The test set, and the outputs of the network on it.
     test: Option<Arc<Dataset>>,
     answers: Option<Arc<Array2<f64>>>,
@@ -28,15 +26,6 @@ pub struct Drawn {
     target: Option<usize>,
     spread_mm: OnceCell<Vec<f64>>,
     pairs: OnceCell<Vec<(f64, f64)>>,
-}
-
-/// The displayed snapshot. For a recording the height of a node is the value of its target, in its unit.
-#[derive(Clone, Debug, Default)]
-pub struct Frames {
-    /// Actual surface.
-    pub actual: Frame,
-    /// Surface decoded by the network, and its error (decoded − actual).
-    pub decoupled: Option<(Frame, Frame)>,
 }
 
 fn is_same<T>(one: Option<&Arc<T>>, other: Option<&Arc<T>>) -> bool {
@@ -62,52 +51,23 @@ impl Drawn {
         let snapshot = snapshot.min(snapshots.saturating_sub(1));
         let (answers, target) = (result.map(|result| &result.answers), recording.map(|_| target));
         let is_same_test = is_same(self.test.as_ref(), Some(test));
-        let is_same_place = is_same_test && self.snapshot == snapshot;
         let is_same_result = is_same_test && is_same(self.answers.as_ref(), answers);
-        if !is_same_result {
-            (self.spread_mm, self.pairs) = Default::default();
-        }
-        if self.target != target {
+        if !is_same_result || self.target != target {
             self.pairs = OnceCell::new();
+        }
+        if !is_same_result {
+            self.spread_mm = OnceCell::new();
+        }
+        if !is_same_result || self.snapshot != snapshot {
+            let answers = answers.map(|answers| &**answers);
+            self.drops_percent = array.and_then(|test| test.drops_percent(&test.readings_ohm(snapshot)));
+            self.surfaces = match array {
+                Some(test) => Some(test.drawing(answers, snapshot)),
+                None => recording.and_then(|test| test.drawing(answers, snapshot)),
+            };
         }
         (self.test, self.answers) = (Some(Arc::clone(test)), answers.cloned());
         (self.snapshot, self.target) = (snapshot, target);
-        if is_same_place && is_same_result {
-            return snapshot;
-        }
-        if let Some(test) = array {
-            self.target_surfaces = None;
-            // The actual surface stays while the network is trained.
-            if !is_same_place {
-                self.drops_percent = test.drops_percent(&test.readings_ohm(snapshot));
-                self.frames.actual = test.frame(test.set.targets(), snapshot);
-            }
-            self.frames.decoupled = result.map(|result| {
-                let decoupled = match &result.frame {
-                    Some((of, frame)) if *of == snapshot => frame.clone(),
-                    _ => test.frame(result.answers.view(), snapshot),
-                };
-                let error = self.frames.actual.error_of(&decoupled);
-                (decoupled, error)
-            });
-            return snapshot;
-        }
-        (self.frames, self.drops_percent, self.target_surfaces) = Default::default();
-        if let Some(test) = recording
-            && let Positions::Surface(through) = &test.positions
-        {
-            let actual = test.set.targets().row(snapshot).to_vec();
-            let decoded = result.map(|result| result.answers.row(snapshot).to_vec());
-            let range = through.range_of(&test.ranges);
-            let surfaces = through.surfaces(&actual, decoded.as_ref().unwrap_or(&actual), range);
-            let [actual, found, error] = surfaces.each_ref().map(|surface| Frame {
-                nodes_mm: Arc::clone(&surface.nodes),
-                grid_mm: Arc::clone(&surface.values),
-            });
-            let decoupled = decoded.map(|_| (found, error));
-            self.frames = Frames { actual, decoupled };
-            self.target_surfaces = Some(surfaces);
-        }
         snapshot
     }
 
@@ -117,8 +77,8 @@ impl Drawn {
 
     /// Returns the root mean square error of each node, once there is a result: [`node_rms_mm`].
     pub(super) fn spread_mm(&self) -> Option<&[f64]> {
-        let (test, decoupled_mm) = self.result()?;
-        Some(self.spread_mm.get_or_init(|| node_rms_mm(test, decoupled_mm)))
+        let (test, decoded_mm) = self.result()?;
+        Some(self.spread_mm.get_or_init(|| node_rms_mm(test, decoded_mm)))
     }
 
     /// Actual and decoded values of the test set, once there is a result: z of the nodes of an array in millimetres, or the
@@ -151,7 +111,6 @@ mod tests {
             charts: None,
             remarks: Vec::new(),
             coverage: Vec::new(),
-            frame: None,
             best_epoch: 0,
             defect: None,
             epochs_run: 0,
@@ -188,20 +147,20 @@ mod tests {
         }));
         let mut drawn = Drawn::default();
         drawn.follow(&shared, shared.result(), 0, 0);
-        assert!(drawn.pairs().is_none() && drawn.frames.decoupled.is_none());
+        assert!(drawn.pairs().is_none() && drawn.surfaces.as_ref().unwrap().decoded.is_none());
 
         shared.run.as_mut().unwrap().result = Some(result(&run));
         assert_eq!(drawn.follow(&shared, shared.result(), 0, 0), 0);
         let first = value_pairs(run.test(), &run.decouple_test(), None);
         assert_eq!(drawn.pairs(), Some(&first[..]));
         let (pairs, spread) = (drawn.pairs().unwrap().as_ptr(), drawn.spread_mm().unwrap().as_ptr());
-        let actual = drawn.frames.actual.nodes_mm.clone();
+        let actual = drawn.surfaces.as_ref().unwrap().actual.nodes.clone();
         assert_eq!(
             drawn.follow(&shared, shared.result(), 1_000_000, 0),
             3,
             "the last of four snapshots"
         );
-        assert_ne!(drawn.frames.actual.nodes_mm, actual);
+        assert_ne!(drawn.surfaces.as_ref().unwrap().actual.nodes, actual);
         assert_eq!(
             drawn.pairs().unwrap().as_ptr(),
             pairs,

@@ -103,7 +103,6 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     shown.push(Shown::table("Decoder table", stem("decoders"), decoders));
     let standing = run.and_then(|run| match shared.phase {
         Phase::Paused | Phase::Calibrating | Phase::Ended(_) => Ok(checkpoint_task(run)),
-        Phase::Died => Err("The training was lost with its thread: train again.".to_owned()),
         _ => Err("A training under way cannot be saved: pause it first.".to_owned()),
     });
     shown.push(Shown::file("Checkpoint", standing));
@@ -142,78 +141,62 @@ fn measured(view: &TrainView) -> Vec<DecoderReport> {
 }
 
 /// A figure of the paper that the window can show: its configuration, and how its results are displayed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PaperFigure {
-    /// Surfaces of 10×10_5×30 from above.
-    Four,
-    /// Nodes of 10×6_3×18.
-    Six,
-    /// Surfaces of 10×6_3×18 in space.
-    Seven,
-    /// The same from above.
-    Eight,
+#[derive(Clone, Copy, Debug)]
+pub struct PaperFigure {
+    /// Its array and how it is displayed.
+    pub name: &'static str,
+    /// A description of the figure in a sentence.
+    pub description: &'static str,
+    scale: &'static str,
+    /// How its surfaces are viewed; `None` if it shows none.
+    pub mode: Option<ViewMode>,
+    /// Its chart; `None` if it shows none.
+    pub chart: Option<&'static str>,
 }
 
+/// The figures of the paper, in its order.
+pub const PAPER_FIGURES: [PaperFigure; 4] = [
+    PaperFigure {
+        name: "10×10, top view",
+        description: "Fig. 4: trains 10×10_5×30 with 12 hidden nodes and shows actual and decoded surface from above. \
+                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
+        scale: "10×10_5×30",
+        mode: Some(ViewMode::Top),
+        chart: None,
+    },
+    PaperFigure {
+        name: "10×6, nodes",
+        description: "Fig. 6: trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoded as \
+                      discs.",
+        scale: "10×6_3×18",
+        mode: None,
+        chart: Some(NODES.name),
+    },
+    PaperFigure {
+        name: "10×6, 3-D",
+        description: "Fig. 7: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoded surface in space. \
+                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
+        scale: "10×6_3×18",
+        mode: Some(ViewMode::ThreeD),
+        chart: None,
+    },
+    PaperFigure {
+        name: "10×6, top view",
+        description: "Fig. 8: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoded surface from above. \
+                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
+        scale: "10×6_3×18",
+        mode: Some(ViewMode::Top),
+        chart: None,
+    },
+];
+
 impl PaperFigure {
-    /// In the paper's order.
-    pub const ALL: [Self; 4] = [Self::Four, Self::Six, Self::Seven, Self::Eight];
-
-    /// Returns its array and how it is displayed.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Four => "10×10, top view",
-            Self::Six => "10×6, nodes",
-            Self::Seven => "10×6, 3-D",
-            Self::Eight => "10×6, top view",
-        }
-    }
-
-    /// Returns a description of the figure in a sentence.
-    pub fn description(self) -> &'static str {
-        match self {
-            Self::Four => {
-                "Fig. 4: trains 10×10_5×30 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
-                 paper's spline, ours includes a plane: level nodes give a level surface."
-            }
-            Self::Six => {
-                "Fig. 6: trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoupled as \
-                 discs."
-            }
-            Self::Seven => {
-                "Fig. 7: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface in space. Unlike the \
-                 paper's spline, ours includes a plane: level nodes give a level surface."
-            }
-            Self::Eight => {
-                "Fig. 8: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoupled surface from above. Unlike the \
-                 paper's spline, ours includes a plane: level nodes give a level surface."
-            }
-        }
-    }
-
     /// Returns the settings of the training for the figure.
-    pub fn settings(self) -> RunSettings {
-        let scale = match self {
-            Self::Four => "10×10_5×30",
-            Self::Six | Self::Seven | Self::Eight => "10×6_3×18",
-        };
-        let scale = scale.parse().expect("the paper's arrays are possible");
+    pub fn settings(&self) -> RunSettings {
+        let scale = self.scale.parse().expect("the paper's arrays are possible");
         RunSettings::from(Simulation {
             sensor: SensorModel::new(scale),
             ..Simulation::default()
         })
-    }
-
-    /// Returns how its surfaces are viewed; `None` if it shows none.
-    pub fn mode(self) -> Option<ViewMode> {
-        match self {
-            Self::Four | Self::Eight => Some(ViewMode::Top),
-            Self::Seven => Some(ViewMode::ThreeD),
-            Self::Six => None,
-        }
-    }
-
-    /// Returns its chart; `None` if it shows none.
-    pub fn tab(self) -> Option<&'static str> {
-        (self == Self::Six).then_some(NODES.name)
     }
 }

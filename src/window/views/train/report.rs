@@ -17,7 +17,7 @@ use eframe::egui::{Align, Layout, Response, RichText, Ui};
 use super::{decoders::decoders_ui, exports::open_task, press::press_section_ui, recording::bias, view::TrainView};
 use crate::window::{
     glossary,
-    shared::{Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
+    shared::{Effect, NetworkSource, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
     test_view::TestView,
     theme::{space, type_size},
     widgets::{
@@ -41,7 +41,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             None => expectation_ui(ui, shared),
         }
         section_heading_ui(ui, "Open");
-        let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
+        let can_open = !shared.phase.is_busy();
         ui.add_enabled_ui(can_open, |ui| {
             let button = ghost_button("Open checkpoint…").min_size([ui.available_width(), space(7)].into());
             let task = open_task(shared);
@@ -98,7 +98,7 @@ fn errors_ui(
     let source = { view.decoders.is_open }.then(|| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
     let (decoders, target) = (&mut view.decoders, &mut view.target);
     let measured = (&*run.problem, model_based);
-    let asked = decoders_ui(ui, decoders, shared.phase, measured, target, source.as_ref());
+    let asked = decoders_ui(ui, decoders, measured, target, source.as_ref());
     effects.extend(asked.map(|exporting| Effect::Export(Box::new(exporting))));
     let best = run.history.get(result.best_epoch);
     if let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) {

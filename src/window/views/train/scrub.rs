@@ -8,7 +8,7 @@ use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, access
 
 use crate::window::{
     job::{Background, JobError, Wake},
-    shared::{RunResult, Shared},
+    shared::{Effect, Matter, Notice, RunResult, Shared},
     test_view::TestSet,
     theme::{Theme, space, type_size},
     training_worker::{PastNetworks, RunId},
@@ -30,8 +30,6 @@ pub struct ScrubState {
     /// Result of the network of an epoch.
     result: Option<RunResult>,
     job: Background<Result<Option<RunResult>, JobError>>,
-    /// Reason why the network of an epoch could not be shown, until it is reported.
-    failure: Option<JobError>,
     /// When the replay began, in seconds, and at which epoch.
     replay: Option<(f64, usize)>,
 }
@@ -44,7 +42,6 @@ impl ScrubState {
             wanted: None,
             result: None,
             job: Background::prompt("past network", wake),
-            failure: None,
             replay: None,
         }
     }
@@ -95,7 +92,7 @@ impl ScrubState {
     }
 
     /// Leaves an epoch of another training, and computes the results of the requested epoch on the test set.
-    pub fn follow(&mut self, shared: &Shared) {
+    pub fn follow(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         let run = shared.shown_run();
         let id = run.map(|run| run.id);
         if self.of != id {
@@ -110,7 +107,8 @@ impl ScrubState {
                 Ok(None) => self.show_latest(),
                 Err(error) => {
                     self.show_latest();
-                    self.failure = Some(error);
+                    let reason = format!("The network of this epoch cannot be shown: {error}");
+                    effects.push(Effect::Notify(Matter::Training, Notice::Failed(reason)));
                 }
             }
         }
@@ -130,12 +128,6 @@ impl ScrubState {
             self.job.start(compute, |computed| computed);
         }
     }
-
-    /// Returns the reason why the network of an epoch could not be shown, once.
-    pub(super) fn take_failure(&mut self) -> Option<String> {
-        let error = self.failure.take()?;
-        Some(format!("The network of this epoch cannot be shown: {error}"))
-    }
 }
 
 /// Returns the result of the network of an epoch, if it is kept; `present` is that of the same training now.
@@ -148,13 +140,9 @@ fn result_at(
 ) -> Option<RunResult> {
     let past = past.at(epoch, &present.networks)?;
     let answers = ProgramDecoder::new(past.networks.decoder_program(problem, None)).answers_to(test.set());
-    // The displayed snapshot is decoded too, as in the results of the training itself.
-    let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
-    let frame = |array: &crate::window::test_view::TestView| (snapshot, array.frame(answers.view(), snapshot));
     Some(RunResult {
         errors: TestErrors::measure(problem, test.set(), &answers),
         network_alone: None,
-        frame: test.array().map(frame),
         charts: test.recording().map(|test| Arc::new(test.charts(&answers))),
         remarks: Vec::new(),
         coverage: Vec::new(),

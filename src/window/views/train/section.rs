@@ -7,10 +7,9 @@ use decoupler_files::figure::{
 use eframe::egui::{Button, Color32, TextStyle, Ui, Vec2, WidgetInfo, accesskit::Role};
 use glam::DVec2;
 
-use super::drawn::Frames;
 use crate::window::{
     shared::Look,
-    test_view::TestView,
+    test_view::{Drawing, TestView},
     theme::space,
     widgets::{dim_ui, explained_options_ui},
 };
@@ -87,10 +86,10 @@ impl SectionChoice {
 }
 
 /// Returns the figure of the section through the displayed surfaces.
-pub fn section_of(choice: &SectionChoice, test: &TestView, frames: &Frames, look: Look) -> PlotFigure {
-    let surface = |frame| look.dressed(&test.heights("", frame), String::new());
-    let decoded = frames.decoupled.as_ref().map(|(decoded, _)| surface(decoded));
-    let (section, actual) = (choice.section(test), surface(&frames.actual));
+pub fn section_of(choice: &SectionChoice, test: &TestView, drawing: &Drawing, look: Look) -> PlotFigure {
+    let dressed = |surface| look.dressed(surface, String::new());
+    let decoded = drawing.decoded.as_ref().map(|[decoded, _]| dressed(decoded));
+    let (section, actual) = (choice.section(test), dressed(&drawing.actual));
     section_figure(&section, &test.rows, &actual, decoded.as_ref())
 }
 

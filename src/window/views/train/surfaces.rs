@@ -12,14 +12,13 @@ use glam::DVec2;
 
 use super::{
     charts::{SAMPLE, SECTION, has_target_surface, lit_nodes},
-    drawn::Frames,
     press::{Hand, Shown},
     view::TrainView,
 };
 use crate::window::{
     shared::{Effect, Phase, RightCard, Shared, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
-    test_view::Positions,
+    test_view::{Drawing, Positions},
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
 };
@@ -68,25 +67,17 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
 
 /// Returns the displayed surfaces of the snapshot: the actual one, and the one of the network if there is one.
 pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
-    let frames = view.frames();
-    let mut surfaces = Vec::new();
-    if let Some(test) = shared.test() {
-        surfaces.push(test.heights("Actual", &frames.actual));
-        surfaces.extend(frames.decoupled.as_ref().map(|(decoded, error)| match view.right {
-            RightCard::Decoupled => test.heights("Decoded", decoded),
-            RightCard::Error => test.errors("Error", error),
-        }));
-    } else if let Some([actual, decoded, error]) = &view.drawn.target_surfaces {
-        surfaces.push(actual.clone());
-        surfaces.extend(frames.decoupled.is_some().then(|| match view.right {
-            RightCard::Decoupled => decoded.clone(),
-            RightCard::Error => error.clone(),
-        }));
-    }
-    let dressed = |surface: Surface| shared.look.dressed(&surface, surface.title.clone());
+    let drawn = view.drawing().into_iter().flat_map(|drawing| {
+        let decoded = drawing.decoded.as_ref().map(|[decoded, error]| match view.right {
+            RightCard::Decoupled => decoded,
+            RightCard::Error => error,
+        });
+        std::iter::once(&drawing.actual).chain(decoded)
+    });
+    let dressed = drawn.map(|surface| shared.look.dressed(surface, surface.title.clone()));
     let is_cut = view.tab == SECTION.name;
     SurfaceFigure {
-        surfaces: surfaces.into_iter().map(dressed).collect(),
+        surfaces: dressed.collect(),
         camera: shared.look.camera,
         marked_node: view.lights.node.and_then(|item| match through(shared) {
             Some(through) => through.nodes().iter().position(|node| node.target == item),
@@ -221,11 +212,15 @@ fn surface_ui(
     {
         view.section.choose_at(place.truncate(), test);
     }
-    shown.node_tooltip_ui(|ui, node| node_values_ui(ui, view.frames(), shared, node));
+    shown.node_tooltip_ui(|ui, node| {
+        if let Some(drawing) = view.drawing() {
+            node_values_ui(ui, drawing, shared, node);
+        }
+    });
 }
 
 /// The node under the pointer and its values, in two lines that hide little.
-fn node_values_ui(ui: &mut Ui, frames: &Frames, shared: &Shared, node: usize) {
+fn node_values_ui(ui: &mut Ui, drawing: &Drawing, shared: &Shared, node: usize) {
     let target = || shared.recorded_test()?.problem.targets.get(item_at(shared, node)?);
     let (title, [name, found], unit) = if let Some(test) = shared.test() {
         let per_row = test.sensor.scale.nodes_per_row();
@@ -238,7 +233,7 @@ fn node_values_ui(ui: &mut Ui, frames: &Frames, shared: &Shared, node: usize) {
     } else {
         return;
     };
-    let Some(actual) = frames.actual.nodes_mm.get(node) else {
+    let Some(actual) = drawing.actual.nodes.get(node) else {
         return;
     };
     ui.spacing_mut().item_spacing.y = 0.0;
@@ -248,10 +243,8 @@ fn node_values_ui(ui: &mut Ui, frames: &Frames, shared: &Shared, node: usize) {
         dim_ui(ui, &format!("x {x}, y {y} mm"));
     });
     let mut text = format!("{name} {}{unit}", format_number(actual.z));
-    if let Some((decoded, error)) = &frames.decoupled
-        && let (Some(decoded), Some(error)) = (decoded.nodes_mm.get(node), error.nodes_mm.get(node))
-    {
-        let [decoded, error] = [decoded.z, error.z].map(format_number);
+    if let Some(decoded) = &drawing.decoded {
+        let [decoded, error] = decoded.each_ref().map(|surface| format_number(surface.nodes[node].z));
         text += &format!(", {found} {decoded}{unit}, error {error}{unit}");
     }
     ui.label(RichText::new(text).size(type_size().note));

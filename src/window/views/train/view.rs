@@ -9,7 +9,7 @@ use super::{
     charts::{charts_card_ui, readings_of_view_ui},
     configuration::configuration_ui,
     decoders::Decoders,
-    drawn::{Drawn, Frames},
+    drawn::Drawn,
     exports::{PaperFigure, shown},
     press::{PressState, readings_head_ui},
     recording::{RecordingEditor, recipe_task},
@@ -21,10 +21,10 @@ use super::{
 use crate::window::{
     job::Wake,
     shared::{
-        Command, Effect, Holdings, Look, MIN_WIDTH_FOR_REPORT, Matter, Notice, Offers, Phase, RightCard, RunResult,
-        RunView, Shared, Shown, SourceKind, Status, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, Look, MIN_WIDTH_FOR_REPORT, Offers, Phase, RightCard, RunResult, RunView, Shared,
+        Shown, SourceKind, Status, Unfinished, View, run_buttons_ui,
     },
-    test_view::RecordedTest,
+    test_view::{Drawing, RecordedTest},
     theme::space,
     widgets::{card_ui, snapshot_ui},
 };
@@ -33,8 +33,7 @@ impl View for TrainView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
         self.decoders.follow(shared);
-        let failure = self.scrub.take_failure();
-        effects.extend(failure.map(|reason| Effect::Notify(Matter::Training, Notice::Failed(reason))));
+        self.scrub.follow(shared, effects);
     }
 
     fn holdings(&self, _shared: &Shared) -> Holdings {
@@ -53,9 +52,9 @@ impl View for TrainView {
 
     fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
         if offers.is_heard {
-            let frames = self.frames().clone();
-            self.press
-                .take_pointer(offers.ctx, shared.test(), &frames, self.lights.node);
+            let lit = self.lights.node;
+            let lit = lit.and_then(|node| self.drawing()?.actual.nodes.get(node).copied());
+            self.press.take_pointer(offers.ctx, shared.test(), lit);
             self.follow(shared);
         }
         let phase = shared.phase;
@@ -65,7 +64,7 @@ impl View for TrainView {
         };
         let can_pause = matches!(phase, Phase::Training | Phase::Paused);
         for (command, is_possible, effect) in [
-            (Command::Train, shared.can_train(), Effect::Train),
+            (Command::Train, !phase.is_busy(), Effect::Train),
             (Command::TrainLonger, shared.can_continue(), Effect::Continue),
             (pause, can_pause, paused),
             (Command::StopTraining, phase.is_busy(), Effect::Stop),
@@ -128,10 +127,6 @@ impl View for TrainView {
             return None;
         }
         self.follow(shared);
-        if self.watched != self.snapshot {
-            self.watched = self.snapshot;
-            effects.push(Effect::Watch(self.snapshot));
-        }
         self.workbench_ui(ui, shared, effects);
         None
     }
@@ -153,8 +148,6 @@ pub struct TrainView {
     pub snapshot: usize,
     /// Target of a recording whose values the charts show.
     pub(super) target: usize,
-    /// Snapshot last sent to the worker.
-    watched: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
     /// Name of the chart below.
@@ -183,7 +176,6 @@ impl TrainView {
         Self {
             snapshot: 0,
             target: 0,
-            watched: 0,
             right: RightCard::default(),
             tab: "Loss",
             lights: Lighting::default(),
@@ -235,13 +227,12 @@ impl TrainView {
 
     /// Draws what is displayed.
     fn follow(&mut self, shared: &Shared) {
-        self.scrub.follow(shared);
         let result = self.scrub.shown(shared);
         let target = shared.recorded_test().map_or(0, |test| self.target_of(test));
         self.snapshot = self.drawn.follow(shared, result, self.snapshot, target);
         self.press.follow(shared, result);
         let of_recording = shared.recorded_test().map(|test| test.set.outputs());
-        let items = of_recording.unwrap_or(self.frames().actual.nodes_mm.len());
+        let items = of_recording.unwrap_or(self.drawing().map_or(0, |drawing| drawing.actual.nodes.len()));
         self.lights.node = self.lights.node.filter(|&item| item < items);
     }
 
@@ -251,8 +242,9 @@ impl TrainView {
     }
 
     /// Returns the displayed surfaces: those under the finger, or those of the test set.
-    pub fn frames(&self) -> &Frames {
-        self.press.frames().unwrap_or(&self.drawn.frames)
+    pub fn drawing(&self) -> Option<&Drawing> {
+        let pressed = self.press.shown().map(|shown| &shown.drawing);
+        pressed.or(self.drawn.surfaces.as_ref())
     }
 
     /// Returns the drops of the readings of the displayed surface from those at rest, in percent: rows read × M4.
@@ -292,8 +284,8 @@ impl TrainView {
         let settings = figure.settings();
         effects.push(Effect::Configure(Box::new(settings)));
         self.right = RightCard::Decoupled;
-        self.tab = figure.tab().unwrap_or(self.tab);
-        if let Some(mode) = figure.mode() {
+        self.tab = figure.chart.unwrap_or(self.tab);
+        if let Some(mode) = figure.mode {
             effects.push(Effect::Look(Look { mode, ..shared.look }));
         }
         let is_complete = |run: &RunView| {

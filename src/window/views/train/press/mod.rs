@@ -25,7 +25,6 @@ use crate::window::{
     shared::{RunResult, Shared},
     surface_view::SurfaceViewResponse,
     test_view::TestView,
-    views::train::drawn::Frames,
 };
 
 pub use section::{press_section_ui, readings_head_ui, readings_ui};
@@ -46,11 +45,14 @@ pub struct PressState {
     /// The actual surface as last drawn.
     target: Option<Target>,
     /// The latest answer, or why there is none, with its question.
-    answered: Option<(Question, Result<Shown, String>)>,
-    solving: Background<Result<(Question, Result<Shown, String>), JobError>>,
+    answered: Option<Answered>,
+    solving: Background<Result<Answered, JobError>>,
     comparison: Comparison,
     demo: Demo,
 }
+
+/// A question with its answer, or why there is none.
+type Answered = (Question, Result<Shown, String>);
 
 impl PressState {
     /// Nothing pressed. `wake` is called when something was computed in the background.
@@ -76,11 +78,6 @@ impl PressState {
     /// What is shown of the touch; `None` while the test set is displayed, or before the first answer.
     pub fn shown(&self) -> Option<&Shown> {
         self.answered.as_ref()?.1.as_ref().ok()
-    }
-
-    /// Surfaces of the touch.
-    pub fn frames(&self) -> Option<&Frames> {
-        self.shown().map(|shown| &shown.frames)
     }
 
     /// Goes back to the test set.

@@ -3,7 +3,7 @@ use eframe::egui::{Context, Key, Modifiers, Painter, PointerButton, Pos2, Respon
 use glam::{DVec2, DVec3};
 
 use super::{Hand, PressState, Target};
-use crate::window::{test_view::TestView, theme::Palette, views::train::drawn::Frames};
+use crate::window::{test_view::TestView, theme::Palette};
 
 /// Share of the stroke per point of scrolling: the whole stroke takes about ten notches of a typical wheel.
 const SHARE_PER_POINT: f64 = 0.002;
@@ -15,9 +15,8 @@ const PIECES: usize = 64;
 const DASH: [f32; 2] = [4.0, 3.0];
 
 impl PressState {
-    /// Handles mouse and keys before anything of this frame is drawn. `frames` are those displayed, and `lit` is the node lit
-    /// by the pointer.
-    pub fn take_pointer(&mut self, ctx: &Context, test: Option<&TestView>, frames: &Frames, lit: Option<usize>) {
+    /// Handles mouse and keys before anything of this frame is drawn. `lit` is the node lit by the pointer.
+    pub fn take_pointer(&mut self, ctx: &Context, test: Option<&TestView>, lit: Option<DVec3>) {
         let target = self.target.clone();
         let has_focus = |target: &Target| ctx.memory(|memory| memory.has_focus(target.id));
         let is_typing = ctx.memory(|memory| memory.focused().is_some()) && !target.as_ref().is_some_and(has_focus);
@@ -39,7 +38,7 @@ impl PressState {
         let met = ray.and_then(|ray| match self.grip_mm {
             Some(level_mm) => ray.at_level(level_mm),
             // The line of sight may miss a lit node on a crest, and meet the surface far behind it.
-            None => match lit.and_then(|node| frames.actual.nodes_mm.get(node)) {
+            None => match lit {
                 Some(node) => ray.at_level(node.z),
                 None => target.surface.pick(&ray),
             },

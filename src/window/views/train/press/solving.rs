@@ -15,7 +15,7 @@ use glam::DVec2;
 use ndarray::Array2;
 
 use super::Finger;
-use crate::window::{test_view::TestView, views::train::drawn::Frames};
+use crate::window::test_view::{Drawing, TestView};
 
 /// The network that decodes the touch.
 #[derive(Clone, Debug)]
@@ -63,7 +63,7 @@ pub struct Shown {
     /// The pressed sensor: a test set of one snapshot, without noise.
     pub(super) pressed: TestView,
     /// Its surface, the network's, and their difference.
-    pub(super) frames: Frames,
+    pub drawing: Drawing,
     /// Drops of its readings below those at rest, in percent: rows read × M4.
     pub drops_percent: Option<Array2<f64>>,
     /// The network's answer, if there is a network, or why it has none.
@@ -85,15 +85,9 @@ pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
     let shown = press(&question).map(|pressed| {
         let networks = question.subject.as_ref().map(|subject| &*subject.networks);
         let decoded = networks.map(|networks| decode(&mut networks.decoder(), &pressed));
-        let actual = pressed.frame(pressed.set.targets(), 0);
         let answers = decoded.as_ref().and_then(|decoded| decoded.as_ref().ok());
-        let decoupled = answers.map(|(answers, _)| {
-            let decoupled = pressed.frame(answers.view(), 0);
-            let error = actual.error_of(&decoupled);
-            (decoupled, error)
-        });
         Shown {
-            frames: Frames { actual, decoupled },
+            drawing: pressed.drawing(answers.map(|(answers, _)| answers), 0),
             drops_percent: pressed.drops_percent(&pressed.readings_ohm(0)),
             answer: decoded.map(|decoded| decoded.map(|(_, answer)| answer)),
             outside: networks.map_or(0, |networks| outside(networks, &pressed.set)),
