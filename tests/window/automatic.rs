@@ -73,7 +73,7 @@ fn chosen_settings_are_disabled_show_what_was_chosen_and_are_kept_when_the_choic
     }
     assert_eq!(driver.state().settings(), chosen);
     // The trained network can be trained further.
-    assert!(driver.has("Continue"));
+    assert!(driver.has("Train longer"));
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn a_given_memory_is_kept_by_the_choice() {
     assert!(driver.says("Chosen automatically while these fields are empty"));
     driver.enter("Lags", "3");
     driver.settle();
-    assert!(driver.says(", fixed"), "{:#?}", driver.texts());
+    assert!(driver.says("lags 3"), "{:#?}", driver.texts());
     driver.click("▶ Train");
     driver.wait_for_training();
     let run = driver.state().run.as_ref().unwrap();

@@ -52,7 +52,9 @@ fn the_baselines_are_shown_before_a_training() {
     assert_eq!(driver.table()[..expected.len()], expected);
     assert!(driver.has("Published") && driver.says("Press Train to fill in the network's row"));
     driver.open_menu();
-    assert!(!driver.is_enabled("Network…") && driver.says("Nothing is trained yet"));
+    assert!(!driver.is_enabled("Network…"));
+    driver.get("Network…").hover();
+    driver.wait("the reason", |driver| driver.says("Nothing is trained yet"));
     driver.press(eframe::egui::Key::Escape);
 
     // Other samples to train on, the same to test on.

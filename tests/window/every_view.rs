@@ -19,14 +19,7 @@ use crate::{
 };
 
 /// The views, as named in the top bar.
-pub(crate) const VIEWS: [&str; 6] = [
-    "Train",
-    "Experiments",
-    "Compare",
-    "Identifiability",
-    "Trade-off",
-    "Live",
-];
+pub(crate) const VIEWS: [&str; 5] = ["Train", "Study", "Compare", "Sensor", "Live"];
 
 /// Sizes of the window in pixels.
 const SIZES: [Vec2; 4] = [
@@ -59,7 +52,7 @@ const CONTROLS: [Role; 10] = [
 /// Shows a view and waits for what it computes without being asked.
 pub(crate) fn show(driver: &mut Driver, view: &str) {
     driver.click_button(view);
-    if view == "Identifiability" && driver.says("Amplitude") {
+    if view == "Sensor" && driver.has("Array scale") {
         driver.wait("the analysis", |driver| driver.says("Condition number: "));
     }
     driver.settle();

@@ -133,7 +133,11 @@ fn an_analysis_of_a_recording_can_be_cancelled_and_closing_asks_about_it() {
     driver.wait("the trainings", |driver| driver.says("Cross-validation…"));
     assert!(!driver.close(), "the analysis is not lost without a question");
     driver.harness().run_steps(2);
-    assert!(driver.has("Study: Cross-validation"), "{:#?}", driver.texts());
+    assert!(
+        driver.has("Study: Cross-validation") && driver.says("5 trainings"),
+        "{:#?}",
+        driver.texts()
+    );
     driver.click_button("Cancel");
     driver.click_button("■ Cancel");
     driver.settle();

@@ -71,7 +71,7 @@ fn the_limit_of_a_join_and_units_survive_other_files_missing_cells_and_layouts()
     driver.settle();
     assert_eq!(meaning(&driver, "states.c3").as_deref(), Some("unused"));
     driver.click("Joined files");
-    driver.enter("Limit for states.csv", "0.0045");
+    driver.enter("Limit", "0.0045");
     driver.wait("the limit", |driver| driver.says("within 0.00450"));
 
     set_missing(&mut driver, "-1");

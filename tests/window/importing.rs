@@ -236,7 +236,7 @@ fn a_checkpoint_continues_as_if_it_had_never_stopped() {
     other.settle();
     assert!(!other.has("Meaning of u1"), "the results are displayed");
     other.limit_epochs("2");
-    other.click_button("Continue");
+    other.click_button("Train longer");
     other.wait("the end", |driver| {
         let result = driver.state().result();
         result.is_some_and(|result| result.is_idle && result.epochs_run == 5)
@@ -468,7 +468,7 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
         driver.has("Training: 3") && driver.says("v is missing")
     });
     // The columns are read and the samples counted by different threads.
-    driver.wait("the missing cell", |driver| driver.has("Missing in v: 1"));
+    driver.wait("the missing cell", |driver| driver.has("v, missing: 1"));
 }
 
 #[test]

@@ -15,16 +15,15 @@ pub fn preset_ui(ui: &mut Ui, settings: &mut RunSettings) {
         (
             Some(Preset::Paper),
             "Paper",
-            "One network for all rows, resistances between −1 and 1, 1000 training samples.\n\nArray, axes, loading, \
-             noise, hidden nodes and seed stay as they are.",
+            "One network for all rows, resistances between −1 and 1, 1000 training samples. Array, axes, loading, noise, \
+             hidden nodes and seed stay as they are.",
         ),
         (
             Some(Preset::Best),
             "Best",
-            "A small network for each known row, whitened conductances, 5000 training samples, or 50 000 if the \
-             readings are noisy.\n\nChosen by measurement: of all and known rows, resistance, conductance and its \
-             logarithm, min-max and whitening, this has the lowest test error for the same hidden nodes.\n\nArray, \
-             axes, loading, noise, hidden nodes and seed stay as they are.",
+            "A small network for each known row, whitened conductances, 5000 training samples, or 50 000 if the readings are \
+             noisy: by measurement, the lowest test error for the same hidden nodes. Array, axes, loading, noise, hidden \
+             nodes and seed stay as they are.",
         ),
     ];
     if let Some(Some(picked)) = explained_options_ui(ui, "Preset", &options, preset_of(settings), true) {

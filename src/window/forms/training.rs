@@ -1,14 +1,10 @@
 //! The training: its method, the rules that end it, and its restarts.
 
-use decoupler_core::{evaluation::RunSettings, settings::Method, text::counted};
+use decoupler_core::{settings::Method, text::counted};
 use eframe::egui::Ui;
 
 use super::{Fields, Look, Row, SetBy, number_ui};
-use crate::window::widgets::{
-    dim_ui,
-    fields::{capitalised, input_text},
-    fold_ui,
-};
+use crate::window::widgets::{dim_ui, fields::capitalised, fold_ui};
 
 const METHOD: Row = Row(
     "method",
@@ -50,7 +46,8 @@ pub fn training_ui(ui: &mut Ui, fields: &mut Fields<'_>, is_new: bool) {
             fields.show(ui, &STOPPING);
         }
     });
-    fold_ui(ui, "Method settings", &fields.summary(of_method), |ui| {
+    let restarts = fields.summary(|settings| counted(settings.starts, "restart"));
+    fold_ui(ui, "Method settings", &restarts, |ui| {
         if let SetBy::User = fields.set_by {
             let method = &mut fields.settings.training.method;
             for setting in method.settings() {
@@ -60,13 +57,4 @@ pub fn training_ui(ui: &mut Ui, fields: &mut Fields<'_>, is_new: bool) {
         }
         ui.add_enabled_ui(is_new, |ui| fields.show(ui, &RESTARTS));
     });
-}
-
-/// The first of the method's own settings, and the number of restarts.
-fn of_method(settings: &RunSettings) -> String {
-    let method = settings.training.method;
-    let first = method.settings().next();
-    let first = first.and_then(|setting| Some(format!("{} {}, ", setting.name, input_text(setting.number(&method)?))));
-    let starts = counted(settings.starts, "start");
-    format!("{}{starts}", first.unwrap_or_default())
 }

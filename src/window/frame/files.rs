@@ -322,6 +322,9 @@ fn without_source_line(message: &str) -> String {
     cause.map_or(message.to_owned(), |(before, cause)| format!("{before}{cause}"))
 }
 
+/// Why no file is opened now.
+const BUSY: &str = "A training is running: stop it before you open other files.";
+
 impl DecouplerWindow {
     /// Gives files dropped on the window to the view that takes them, and shows it.
     pub(super) fn take_dropped(&mut self, ctx: &Context) {
@@ -336,8 +339,7 @@ impl DecouplerWindow {
             return;
         }
         if self.shared.phase.is_busy() {
-            let text = "A training is running: stop it before you open other files.";
-            self.notices.fail(Matter::Recording, text);
+            self.notices.fail(Matter::Recording, BUSY);
         } else {
             self.views.open_files(paths);
         }
@@ -364,28 +366,12 @@ impl DecouplerWindow {
             StrokeKind::Inside,
         );
         let font = FontId::proportional(type_size().title);
-        let hovered = ui.input(|input| input.raw.hovered_files.clone());
-        let paths: Vec<PathBuf> = hovered.into_iter().filter_map(|file| file.path).collect();
-        let text = in_words(&paths, self.shared.phase.is_busy(), self.views.has_recording());
+        let text = if self.shared.phase.is_busy() {
+            BUSY
+        } else {
+            "Drop to open, or to add to the recording"
+        };
         painter.text(whole.center(), Align2::CENTER_CENTER, text, font, palette.text);
-    }
-}
-
-/// Returns a sentence on what dropping these files will do.
-fn in_words(paths: &[PathBuf], is_busy: bool, has_recording: bool) -> &'static str {
-    // Only their names: reading files would block the window.
-    let is_document = |path: &PathBuf| {
-        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-        extension.is_some_and(|extension| extension == "json" || extension == "checkpoint")
-    };
-    if is_busy {
-        "A training is running: stop it before you open other files"
-    } else if paths.iter().any(is_document) {
-        "Drop to open the recipe, network or checkpoint"
-    } else if has_recording {
-        "Drop to add to the recording"
-    } else {
-        "Drop to open as a recording"
     }
 }
 
@@ -513,19 +499,5 @@ mod tests {
         gate.send(()).unwrap();
         drop(files);
         assert_eq!(fs::read(path).unwrap(), b"text");
-    }
-
-    #[test]
-    fn the_effect_of_a_drop_depends_on_the_file_and_on_the_open_files() {
-        for (name, is_busy, has_recording, beginning) in [
-            ("press.csv", false, false, "Drop to open as a recording"),
-            ("press.csv", false, true, "Drop to add"),
-            ("net.json", false, true, "Drop to open the recipe, network"),
-            ("half.CHECKPOINT", false, false, "Drop to open the recipe, network"),
-            ("press.csv", true, false, "A training is running"),
-        ] {
-            let text = in_words(&[PathBuf::from(name)], is_busy, has_recording);
-            assert!(text.starts_with(beginning), "{name}: {text}");
-        }
     }
 }

@@ -178,8 +178,9 @@ fn jobs_of_a_recording_can_be_started_again_after_a_panic() {
         driver.window_mut().views.open_files(vec![path.clone()]);
         driver.harness().step();
     };
-    panics(&mut driver, "opening", open);
-    panics(&mut driver, "import", open);
+    panics(&mut driver, "recording", open);
+    open(&mut driver);
+    driver.wait("the samples", |driver| driver.says("Test: "));
     driver.click_button("Study");
     driver.click("What the readings determine");
     panics(&mut driver, "study", |driver| driver.act("Begin the study"));

@@ -18,19 +18,18 @@ pub enum FileInUse {
 impl FileInUse {
     /// Returns the reason why the file at `path` must not be overwritten, if it is this file.
     fn reason(&self, path: &Path) -> Option<&'static str> {
-        let (is_this, reason) = match self {
-            Self::Recording(used) => (is_same(used, path), "it is a recording that is open"),
-            Self::Checkpoint(used) => (
-                is_same(used, path),
-                "the current training was resumed from this checkpoint",
-            ),
-            Self::Kept(folder) => (
-                path.parent().is_some_and(|parent| is_same_folder(parent, folder)) && path.exists(),
-                "it is kept by this program from session to session",
-            ),
-            Self::Recorded(used) => (is_same(used, path), "frames are being recorded to it"),
+        let (used, reason) = match self {
+            Self::Recording(used) => (used, "it is a recording that is open"),
+            Self::Checkpoint(used) => (used, "the current training was resumed from this checkpoint"),
+            Self::Recorded(used) => (used, "frames are being recorded to it"),
+            Self::Kept(folder) => {
+                let is_inside = || Some(path.canonicalize().ok()?.parent()? == folder.canonicalize().ok()?);
+                return is_inside()
+                    .unwrap_or(false)
+                    .then_some("it is kept by this program from session to session");
+            }
         };
-        is_this.then_some(reason)
+        is_same(used, path).then_some(reason)
     }
 }
 
@@ -43,11 +42,6 @@ pub fn refuse_in_use(path: &Path, used: &[FileInUse]) -> Result<(), String> {
         Some(reason) => Err(format!("'{}' is in use: {reason}; give another name", path.display())),
         None => Ok(()),
     }
-}
-
-fn is_same_folder(one: &Path, other: &Path) -> bool {
-    let real = |path: &Path| path.canonicalize().ok();
-    real(one).is_some() && real(one) == real(other)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The cards in the middle: the decoded surfaces, the readings or the values over time, and the figures of the stream.
 
+use std::ops::RangeInclusive;
+
 use decoupler_core::{live::ZeroGains, text::counted};
 use decoupler_files::{
     export::{format_duration, format_number},
@@ -9,22 +11,17 @@ use decoupler_files::{
     },
     live::{SourcePlan, Tally},
 };
-use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
+use eframe::egui::{Align, Label, Layout, Rect, RichText, Sense, Slider, Ui, Vec2, WidgetInfo};
 
-use super::{
-    LiveView,
-    engine::Answered,
-    tools::{REPLAY_BAR_HEIGHT, replay_bar_ui},
-};
+use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
     plotting::{cells_ui, titled_plots_ui},
-    shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
+    shared::{Command, Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
-    test_view::HeightScale,
     theme::{Theme, semibold, space, type_size},
     widgets::{
         card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
-        section_heading_ui,
+        section_heading_ui, slider_ui,
     },
 };
 
@@ -70,6 +67,55 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, &answer, shared, effects));
     });
     ui.allocate_rect(whole, Sense::hover());
+}
+
+/// Height of the replay bar, in points.
+const REPLAY_BAR_HEIGHT: f32 = space(12);
+
+/// Shows the position in the recording and the speed.
+fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let Some(replay) = view.shown.replay else { return };
+    if view.running.is_none() {
+        ui.disable();
+    }
+    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+        command_ui(ui, &Command::PlayReplay, view, shared, effects);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let text = RichText::new(format!("{:.1}×", view.source.speed)).size(type_size().note);
+            ui.add_sized([space(8), space(6)], Label::new(text));
+            if bar_slider_ui(ui, "Replay speed", (&mut view.source.speed, 1.0), 0.1..=10.0, space(24)) {
+                view.steer();
+            }
+            dim_ui(ui, "Speed");
+            ui.add_space(space(2));
+            let text = format!("{:.2} of {:.2} s", replay.at_s, replay.length_s);
+            ui.label(RichText::new(text).size(type_size().note));
+            let mut at_s = replay.at_s;
+            let (length_s, width) = (replay.length_s.max(f64::MIN_POSITIVE), ui.available_width() - space(2));
+            if bar_slider_ui(ui, "Replay position", (&mut at_s, 0.0), 0.0..=length_s, width) {
+                view.control(move |control, now| control.seek(at_s, now));
+            }
+        });
+    });
+}
+
+/// Shows a slider that a double click resets to `usual`; returns true if its value has changed.
+fn bar_slider_ui(
+    ui: &mut Ui,
+    name: &str,
+    (value, usual): (&mut f64, f64),
+    range: RangeInclusive<f64>,
+    width: f32,
+) -> bool {
+    let before = *value;
+    let is_logarithmic = *range.start() > 0.0;
+    let slider = slider_ui(ui, Slider::new(value, range).logarithmic(is_logarithmic), width);
+    if slider.double_clicked() {
+        *value = usual;
+    }
+    slider.widget_info(|| WidgetInfo::slider(ui.is_enabled(), before, name));
+    slider.on_hover_text("A double click resets it.");
+    *value != before
 }
 
 /// Shows the decoded surface, the actual one next to it if it is known, and their colour scale.
@@ -124,20 +170,7 @@ fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, look: Look, effects
 
 /// Returns the surfaces of an answer on a common scale.
 pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
-    let dressed = |surface: &Surface| {
-        let heights = surface.nodes.iter().map(|node| node.z).filter(|z| z.is_finite());
-        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
-        let mut dressed = Surface {
-            mode: look.mode,
-            colours: look.colours,
-            ..surface.clone()
-        };
-        if look.heights == HeightScale::Fitted && low <= high {
-            // The resolution is a nanometre.
-            dressed.range = low..=high.max(low + 1e-6);
-        }
-        dressed
-    };
+    let dressed = |surface: &Surface| look.dressed(surface, surface.title.clone());
     SurfaceFigure {
         surfaces: answer.surfaces.iter().map(dressed).collect(),
         camera: look.camera,

@@ -1,6 +1,6 @@
 //! The decoding thread: a session decodes what its source sends, and the window displays the latest.
 //!
-//! [`run`] is the loop. [`Command`]s change the session while it runs. A [`Snapshot`] is sent only after the window has drawn
+//! [`run`] is the loop. [`Request`]s change the session while it runs. A [`Snapshot`] is sent only after the window has drawn
 //! the previous one, so frames do not queue up.
 
 use std::{
@@ -34,7 +34,7 @@ use glam::DVec3;
 use crate::window::{glossary, job::Report};
 
 /// Message to the thread.
-pub enum Command {
+pub enum Request {
     /// The last snapshot was drawn: send the next one.
     Drawn,
     /// Change the session.
@@ -70,7 +70,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(60);
 pub fn run(
     mut plan: SessionPlan,
     shown: Snapshot,
-    commands: &Receiver<Command>,
+    commands: &Receiver<Request>,
     report: &Report<LiveEvent>,
 ) -> Result<(), String> {
     plan.source = plan.source.resolved();
@@ -98,8 +98,8 @@ pub fn run(
             until = until.min(may_show_at);
         }
         match commands.recv_timeout(until.saturating_duration_since(now)) {
-            Ok(Command::Drawn) => is_drawn = true,
-            Ok(Command::Change(change)) => {
+            Ok(Request::Drawn) => is_drawn = true,
+            Ok(Request::Change(change)) => {
                 screen.follow_recording(&session);
                 has_news = true;
                 change(&mut session).unwrap_or_else(|reason| report.send(LiveEvent::Failed(reason)));

@@ -2,12 +2,11 @@
 //! source, a file, a serial port or a socket.
 //!
 //! `engine` is the thread around the session that decodes. `view` starts it, displays its latest snapshot and sends it the
-//! user's changes; the other files show the form, the cards and the tools.
+//! user's changes; the other files show the form and the cards.
 
 mod cards;
 mod engine;
 mod form;
-mod tools;
 mod view;
 
 pub use view::LiveView;

@@ -1,5 +1,6 @@
 use std::{
-    fs,
+    fs::{self, File},
+    io,
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -8,22 +9,27 @@ use std::{
     time::Instant,
 };
 
-use decoupler_core::{scene::Noise, text::counted};
+use decoupler_core::{problem::Channel, scene::Noise, text::counted};
 use decoupler_files::{
-    export::{NetworkFile, atomic_write},
-    live::{Input, LiveArray, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
+    export::{Cell, NetworkFile, Table, TableColumn, atomic_write, is_same},
+    live::{Input, LiveArray, Recorded, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
 };
-use eframe::egui::Ui;
+use eframe::egui::{Ui, Widget};
 
 use super::{
-    cards,
-    engine::{Command, LiveEvent, Snapshot, run},
+    cards::{self, surface_figure},
+    engine::{Answered, LiveEvent, Request, Snapshot, run},
     form::{NETWORK, Picked, SourceForm, SourceKind, form_ui},
-    tools,
 };
 use crate::window::{
+    glossary,
     job::{Background, Wake},
-    shared::{Effect, FileInUse, FileWords, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Tone, View},
+    shared::{
+        Command, Effect, FileInUse, FileTask, FileWords, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Tone,
+        View,
+    },
+    theme::space,
+    widgets::{ghost_button, primary_button},
 };
 
 /// The Live view.
@@ -56,7 +62,7 @@ pub struct Running {
     pub network: String,
     /// Source of the frames.
     pub source: SourcePlan,
-    commands: Sender<Command>,
+    requests: Sender<Request>,
 }
 
 impl Running {
@@ -165,11 +171,11 @@ impl LiveView {
             ..Snapshot::default()
         };
         (self.node, self.ended, self.is_to_be_drawn) = (None, None, false);
-        let (commands, incoming) = channel();
+        let (requests, incoming) = channel();
         self.running = Some(Running {
             network,
             source: plan.source.clone(),
-            commands,
+            requests,
         });
         self.steer();
         if let Some(replay) = replay {
@@ -185,16 +191,16 @@ impl LiveView {
         );
     }
 
-    fn command(&self, command: Command) {
+    fn ask(&self, request: Request) {
         if let Some(running) = &self.running {
-            // A thread that has just ended ignores commands.
-            let _ = running.commands.send(command);
+            // A thread that has just ended ignores requests.
+            let _ = running.requests.send(request);
         }
     }
 
     /// Changes the session on its thread, if it is running; the reason of a failure is shown.
     pub(super) fn change(&self, change: impl FnOnce(&mut Session) -> Result<(), String> + Send + 'static) {
-        self.command(Command::Change(Box::new(change)));
+        self.ask(Request::Change(Box::new(change)));
     }
 
     /// Changes the replay, if there is one.
@@ -370,15 +376,44 @@ impl View for LiveView {
     }
 
     fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-        tools::take_commands(self, offers, shared, effects);
+        for command in COMMANDS {
+            if offers.offer(command.clone(), obstacle(&command, self, shared).is_none()) {
+                carry_out(&command, self, shared, effects);
+            }
+        }
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        tools::tools_ui(ui, self, shared, effects);
+        let count = if self.has_sensor(shared) { 4 } else { 2 };
+        for command in &COMMANDS[..count] {
+            command_ui(ui, command, self, shared, effects);
+        }
     }
 
     fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
-        tools::shown(self, shared)
+        let answer = self.shown.answer.as_deref();
+        let answer = answer.ok_or_else(|| "There is no frame yet: start a source.".to_owned());
+        let surface = answer.clone();
+        let surface = surface.map(|answer| || surface_figure(answer, None, shared.look).into());
+        let surface = Shown::figure("Surface", "live-surface".to_owned(), surface);
+        if let Ok(answer) = &answer
+            && let Some(chart) = &answer.chart
+        {
+            let (chart, values) = (Ok(|| chart.clone().into()), Ok(|| values_table(answer)));
+            let chart = Shown::figure("Decoded values", "live-values".to_owned(), chart);
+            let values = Shown::table("Decoded values", "live-values".to_owned(), values);
+            let surface = (!answer.surfaces.is_empty()).then_some(surface);
+            return [chart].into_iter().chain(surface).chain([values]).collect();
+        }
+        let readings = answer.and_then(|answer| answer.readings.as_ref().ok_or_else(String::new));
+        let readings = readings.map(|readings| || readings.clone().coloured(shared.look.colours).into());
+        let recorded = self.shown.recorded.as_ref().map(save_recording);
+        let recorded = recorded.ok_or_else(|| "Nothing is recorded: press Record while a source runs.".to_owned());
+        vec![
+            surface,
+            Shown::figure("Readings", "live-readings".to_owned(), readings),
+            Shown::file("Recording", recorded),
+        ]
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -389,10 +424,114 @@ impl View for LiveView {
         cards::body_ui(ui, self, shared, effects);
         // The thread may send the next snapshot.
         if std::mem::take(&mut self.is_to_be_drawn) {
-            self.command(Command::Drawn);
+            self.ask(Request::Drawn);
         }
         Some(self.status())
     }
+}
+
+/// Commands on a source, from right to left.
+const COMMANDS: [Command; 5] = [
+    Command::Cancel("Stop live decoding"),
+    Command::Begin("Start live decoding"),
+    Command::Record,
+    Command::ReZero,
+    Command::PlayReplay,
+];
+
+/// Returns the text of the button of a command.
+fn button(command: &Command, view: &LiveView) -> &'static str {
+    match command {
+        Command::Cancel(_) => "■ Stop",
+        Command::Begin(_) => "▶ Start",
+        Command::Record if view.is_recording() => "■ End recording",
+        Command::Record => "● Record",
+        Command::ReZero => "Re-zero",
+        _ if view.shown.replay.is_some_and(|replay| replay.is_playing) => "⏸ Pause",
+        _ => "▶ Play",
+    }
+}
+
+/// Returns the reason why a command is not available now, if there is one.
+fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<String> {
+    let (is_running, is_replay) = (view.running.is_some(), view.shown.replay.is_some());
+    let reason = match command {
+        Command::Begin(_) if is_running => "Frames are being decoded.",
+        Command::Begin(_) => return view.plan(shared).err(),
+        _ if !is_running => "Start a source first.",
+        Command::PlayReplay if !is_replay => "There is no replay.",
+        Command::Record | Command::ReZero if !view.has_sensor(shared) => "This needs the sensor model of an array.",
+        Command::Record if is_replay => "A replay cannot be recorded.",
+        _ => return None,
+    };
+    Some(reason.to_owned())
+}
+
+fn carry_out(command: &Command, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    match command {
+        // The thread ends once the sender of its requests is dropped; the last frame stays on the screen.
+        Command::Cancel(_) => view.running = None,
+        Command::Begin(_) => view.start(shared, effects),
+        Command::Record => view.record(shared),
+        Command::ReZero => view.re_zero(),
+        _ => {
+            let plays = view.shown.replay.is_some_and(|replay| !replay.is_playing);
+            view.control(move |control, now| control.play(plays, now));
+        }
+    }
+}
+
+/// Shows the button of a command.
+pub(super) fn command_ui(
+    ui: &mut Ui,
+    command: &Command,
+    view: &mut LiveView,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
+    let (about, obstacle, text) = (command.about(), obstacle(command, view, shared), button(command, view));
+    let hint = match about.keys {
+        Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
+        None => glossary::UNLOADED_STATE.hint.to_owned(),
+    };
+    let button = ui.add_enabled_ui(obstacle.is_none(), |ui| match command {
+        Command::Begin(_) => primary_button(text).ui(ui),
+        Command::PlayReplay => ui.add(ghost_button(text).min_size([space(18), space(6)].into())),
+        Command::Record => ui.add(ghost_button(text).selected(view.is_recording())),
+        _ => ui.add(ghost_button(text)),
+    });
+    let button = button.inner.on_hover_text(hint);
+    if button.on_disabled_hover_text(obstacle.unwrap_or_default()).clicked() {
+        carry_out(command, view, shared, effects);
+    }
+}
+
+fn values_table(answer: &Answered) -> Table {
+    let names = answer.network.problem.targets.iter().map(Channel::title);
+    let columns = std::iter::once("time_s".to_owned()).chain(names);
+    let row = |(time_s, values): &(f64, Arc<[f64]>)| {
+        let values = std::iter::once(time_s).chain(values.iter());
+        values.map(|&value| Cell::from(value)).collect()
+    };
+    Table {
+        columns: columns.map(TableColumn::field).collect(),
+        rows: answer.history.all().iter().map(row).collect(),
+    }
+}
+
+/// Saves a copy of a recording.
+fn save_recording(recorded: &Recorded) -> FileTask {
+    let words = FileWords {
+        kind: "recording",
+        description: "Every frame with its time, as CSV: a line for each row-wire. It can be replayed here, and the terminal \
+                      command decode reads it.",
+        extensions: &["csv"],
+    };
+    let from = recorded.path.clone();
+    FileTask::save(words, "recording", move |path| match is_same(path, &from) {
+        true => Ok(()),
+        false => atomic_write(path, |file| io::copy(&mut File::open(&from)?, file).map(drop)),
+    })
 }
 
 /// Returns the folder for files of this view: next to the runs, or a temporary one.

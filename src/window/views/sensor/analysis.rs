@@ -17,8 +17,6 @@ use glam::DVec3;
 pub(super) struct Analysis {
     /// The sensor.
     pub sensor: SensorModel,
-    /// The rows that are read, the movement, and the noise of the readings.
-    pub scene: Scene,
     /// Each row-wire that is read, with its nodes pressed by half the stroke.
     pub rows: Vec<Identifiability>,
     /// Index in [`Self::rows`] of the row with the smallest singular value.
@@ -77,7 +75,6 @@ impl Analysis {
         let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
         Ok(Some(Self {
             sensor: *sensor,
-            scene: *scene,
             worst,
             noise,
             prior_mm,
@@ -129,42 +126,34 @@ fn surfaces(
     let map = SurfaceMap::shared(&x_mm, &y_mm)?;
     let per_row = sensor.scale.nodes_per_row();
     let nodes_mm = |row: usize| (0..per_row).map(move |node| sensor.geometry.row_node_mm(sensor.scale, row, node));
-    let surface = |title: &str, quantity: Quantity, range: [f64; 2], values: &[f64]| {
-        let nodes = read.iter().flat_map(|&row| nodes_mm(row)).zip(values);
+    let surface = |axis: usize, quantity: Quantity| {
+        let of_row: fn(&Identifiability) -> &[DVec3] = match quantity {
+            Quantity::Pattern => |seen| &seen.worst_pattern,
+            _ => |seen| &seen.sensitivity_per_mm,
+        };
+        let values = rows.iter().flat_map(of_row);
+        let largest = values.clone().map(|value| value.abs().max_element());
+        let largest = largest
+            .filter(|value| value.is_finite())
+            .fold(f64::MIN_POSITIVE, f64::max);
+        let (title, scale, range) = match quantity {
+            Quantity::Pattern => ("Worst-seen deformation", largest, -1.0..=1.0),
+            _ => ("Sensitivity of each node", 1.0, 0.0..=largest),
+        };
+        let values = Vec::from_iter(values.map(|value| value[axis] / scale));
+        let nodes = read.iter().flat_map(|&row| nodes_mm(row)).zip(&values);
         Surface {
             title: title.to_owned(),
             map: Arc::clone(&map),
-            values: map.evaluate(values).into(),
+            values: map.evaluate(&values).into(),
             nodes: nodes.map(|(node, &value)| node.with_z(value)).collect(),
             quantity,
-            range: range[0]..=range[1],
+            range,
             mode: ViewMode::Top,
             colours: SequentialMap::default(),
         }
     };
-    let largest = |of: fn(&Identifiability) -> &[DVec3]| {
-        let values = rows.iter().flat_map(of).map(|value| value.abs().max_element());
-        values
-            .filter(|value| value.is_finite())
-            .fold(f64::MIN_POSITIVE, f64::max)
-    };
-    let deflection = largest(|seen| &seen.worst_pattern);
-    let sensitivity = largest(|seen| &seen.sensitivity_per_mm);
-    let of_axis = |&axis: &usize| {
-        let patterns = rows.iter().flat_map(|seen| &seen.worst_pattern);
-        let patterns = Vec::from_iter(patterns.map(|u| u[axis] / deflection));
-        let sensitivities = rows.iter().flat_map(|seen| &seen.sensitivity_per_mm);
-        let sensitivities = Vec::from_iter(sensitivities.map(|s| s[axis]));
-        [
-            surface("Worst-seen deformation", Quantity::Pattern, [-1.0, 1.0], &patterns),
-            surface(
-                "Sensitivity of each node",
-                Quantity::Sensitivity,
-                [0.0, sensitivity],
-                &sensitivities,
-            ),
-        ]
-    };
+    let of_axis = |&axis: &usize| [Quantity::Pattern, Quantity::Sensitivity].map(|quantity| surface(axis, quantity));
     Ok(scene.movement.axes().indices().iter().map(of_axis).collect())
 }
 
@@ -239,8 +228,10 @@ mod tests {
 
     #[test]
     fn a_mirrored_layout_gives_a_warning_unless_the_row_is_known() {
-        let mut question = Simulation::default();
-        question.sensor = SensorModel::new("10x6_3x18".parse().unwrap());
+        let mut question = Simulation {
+            sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
+            ..Simulation::default()
+        };
         // Column nodes at 7.5, 12.5 and 17.5 mirror the rows about x = 12.5.
         question.sensor.geometry.column_node_x0_mm = 7.5;
         let is_alike = |found: &Analysis| {

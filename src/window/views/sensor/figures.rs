@@ -9,11 +9,11 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder};
 
-use super::{Analysis, SensorView};
+use super::{Analysis, SensorView, view::RECORDED};
 use crate::window::{
     forms::meaning,
     plotting::titled_plots_ui,
-    shared::{Effect, Look, Shared, Shown, colour_scale_ui, follow_surface, view_mode_ui},
+    shared::{Effect, Look, Shared, Shown, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, fact_ui, fields::capitalised, note_ui, scrolled_ui, section_heading_ui, segmented_ui},
@@ -54,9 +54,7 @@ pub(super) fn analysis_ui(
         titled_plots_ui(ui, "Singular values", &singular_values(analysis));
     });
     card_ui(ui, right, |ui| {
-        scrolled_ui(ui, "sensor facts", |ui| {
-            facts_ui(ui, analysis);
-        });
+        scrolled_ui(ui, "sensor facts", |ui| facts_ui(ui, analysis));
     });
     ui.allocate_rect(whole, Sense::hover());
     picked
@@ -68,12 +66,8 @@ fn singular_values(analysis: &Analysis) -> PlotFigure {
 
 /// Returns the surfaces along the displayed axis, or along z if that does not move.
 fn surfaces_figure(view: &SensorView, analysis: &Analysis, look: Look) -> SurfaceFigure {
-    let axes = analysis.scene.movement.axes().indices();
-    let place = axes
-        .iter()
-        .position(|&axis| axis == view.axis)
-        .unwrap_or(axes.len() - 1);
-    let [mut pattern, mut sensitivity] = analysis.surfaces[place].clone();
+    let axis = view.axis.min(analysis.surfaces.len() - 1);
+    let [mut pattern, mut sensitivity] = analysis.surfaces[axis].clone();
     pattern.mode = look.mode;
     (pattern.colours, sensitivity.colours) = (look.colours, look.colours);
     SurfaceFigure {
@@ -142,11 +136,12 @@ fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {
 
 /// Returns what the view shows: surfaces and singular values.
 pub(super) fn shown<'a>(view: &'a SensorView, shared: &'a Shared) -> Vec<Shown<'a>> {
-    let analysis = view.analysis.as_ref();
-    let analysis = analysis.ok_or_else(|| match &view.problem {
-        Some(problem) => problem.clone(),
-        None => "The singular values are still being computed.".to_owned(),
-    });
+    let analysis = match (&view.analysis, &view.problem) {
+        _ if shared.source == SourceKind::Recording => Err(RECORDED.to_owned()),
+        (_, Some(problem)) => Err(problem.clone()),
+        (Some(analysis), None) => Ok(analysis),
+        (None, None) => Err("The singular values are still being computed.".to_owned()),
+    };
     let surfaces = analysis
         .clone()
         .map(|analysis| || Figure::from(surfaces_figure(view, analysis, shared.look)));

@@ -1,5 +1,3 @@
-use std::time::{Duration, Instant};
-
 use decoupler_core::{dataset::Simulation, scene::Scene, sensor::SensorModel, text::counted};
 use eframe::egui::Ui;
 
@@ -9,7 +7,7 @@ use crate::window::{
     job::{Background, Wake},
     shared::{Effect, Shared, Shown, SourceKind, Status, Tone, View},
     theme::space,
-    widgets::{card_ui, dim_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui},
+    widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui},
 };
 
 /// The Sensor view.
@@ -31,8 +29,9 @@ pub struct SensorView {
 /// Result of an analysis; `None` if it was abandoned.
 type Analysed = Result<Option<Box<Analysis>>, String>;
 
-/// An analysis faster than this is completed even if the array changes, so that the pictures follow a dragged value.
-const SHORT: Duration = Duration::from_millis(250);
+/// What the view says while a recording is the source.
+pub(super) const RECORDED: &str =
+    "This view computes what the readings of a simulated array determine. For a recording, Study measures it.";
 
 impl SensorView {
     /// Creates the view; `wake` is called after each analysis.
@@ -59,9 +58,7 @@ impl SensorView {
         self.asked = Some(asked);
         self.job.start(
             move |report| {
-                let begun = Instant::now();
-                let is_abandoned = || report.is_cancelled() && begun.elapsed() > SHORT;
-                let analysis = Analysis::new(&asked.0, &asked.1, is_abandoned);
+                let analysis = Analysis::new(&asked.0, &asked.1, || report.is_cancelled());
                 Ok(analysis.map_err(|error| error.to_string())?.map(Box::new))
             },
             |ended| ended.unwrap_or_else(|error| Err(format!("{error}; change a value to try again"))),
@@ -93,7 +90,6 @@ impl View for SensorView {
         let mut settings = shared.draft;
         scrolled_ui(ui, "sensor form", |ui| {
             if shared.source == SourceKind::Recording {
-                dim_ui(ui, RECORDED);
                 return;
             }
             ui.add_enabled_ui(!shared.phase.is_busy(), |ui| {
@@ -142,19 +138,12 @@ impl View for SensorView {
             }
             (None, None) => {
                 card_ui(ui, whole, |ui| {
-                    placeholder_ui(ui, "The singular values are being computed.")
+                    placeholder_ui(ui, "The singular values are being computed.");
                 });
-                Status::new(Tone::Calm, "Nothing computed yet".to_owned())
+                Status::new(Tone::Busy, "Computing".to_owned())
             }
         };
-        let is_computing = self.job.is_under_way();
-        Some(if is_computing {
-            Status::new(Tone::Busy, "Computing".to_owned())
-        } else {
-            status
-        })
+        let computing = || Status::new(Tone::Busy, "Computing".to_owned());
+        Some(if self.job.is_under_way() { computing() } else { status })
     }
 }
-
-const RECORDED: &str =
-    "This view computes what the readings of a simulated array determine. For a recording, Study measures it.";

@@ -17,7 +17,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        ExperimentColumnKind, ExperimentTable, Table, cells_table, describe_conditions, describe_failures,
+        ExperimentColumnKind, ExperimentTable, cells_table, describe_conditions, describe_failures,
         describe_worse_than_mean, sweep_specification, trials_table,
     },
     figure::{TradeOffLimits, experiment_figure},
@@ -25,7 +25,9 @@ use decoupler_files::{
 };
 use eframe::egui::{ComboBox, Ui};
 
-use super::{Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label};
+use super::{
+    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label,
+};
 use crate::window::{
     shared::Effect,
     theme::space,
@@ -126,12 +128,10 @@ impl ExperimentForm {
         let (_, trials, _) = outcome.parts();
         let networks = trials.saturating_mul(folds).saturating_mul(experiment.base.starts);
         let epochs = counted(experiment.base.training.stopping.epochs, "epoch");
-        Ok(Task {
-            size: format!("{} of at most {epochs}", counted(networks, "training")),
-            outcome: Box::new(outcome),
-            setup: None,
-            run: Box::new(move |reporter| run(experiment, &setup, reporter)),
-        })
+        let size = format!("{} of at most {epochs}", counted(networks, "training"));
+        Ok(Task::new(size, outcome, move |reporter| {
+            run(experiment, &setup, reporter)
+        }))
     }
 
     /// Returns the sweep for the terminal.
@@ -173,8 +173,7 @@ impl ExperimentForm {
         let hint = "Largest number of epochs per training. The paper does not state its own.";
         let epochs = &mut base.training.stopping.epochs;
         count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MAX_EPOCHS);
-        let hint =
-            "Number of trainings from different random weights; the one with the lowest validation error is kept.";
+        let hint = "Number of trainings from other random weights; that with the lowest validation error is kept.";
         count_ui(ui, "Restarts", hint, &mut base.starts, 1..=MAX_STARTS);
     }
 
@@ -348,7 +347,7 @@ impl Outcome for ExperimentOutcome {
         }
     }
 
-    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+    fn tables(&self) -> Vec<NamedTable<'_>> {
         vec![
             ("Every cell", Box::new(|| cells_table(&self.results))),
             ("Every trial", Box::new(|| trials_table(&self.results))),

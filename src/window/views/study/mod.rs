@@ -40,8 +40,9 @@ use crate::window::{
 };
 
 use experiment::ExperimentForm;
-use report::{Note, Page, Point, Report, Row, Tone};
+use report::{Note, Page, Report, Row, Tone};
 use speed::SpeedForm;
+use state::Study;
 pub use state::StudyView;
 use value_list::ValueList;
 
@@ -83,8 +84,7 @@ impl Topic {
             Self::Table(PaperTable::CrossValidation) => [
                 "Table 2",
                 "Run",
-                "Cross-validation of a large and a small dataset, shuffled again in each repeat, and the scatter of the \
-                 errors over the folds (the paper's Fig. 5).",
+                "Cross-validation of a large and a small dataset, shuffled in each repeat (the paper's Fig. 5).",
             ],
             Self::Table(PaperTable::ArrayScales) => [
                 "Table 3",
@@ -99,14 +99,12 @@ impl Topic {
             Self::Speed => [
                 "Speed against accuracy",
                 "Measure",
-                "The error, the time for a frame and the training time of every decoder, for an array at several noise \
-                 levels, measured on this machine.",
+                "The error, the time for a frame and the training time of every decoder, on this machine.",
             ],
             Self::Readings => [
                 "What the readings determine",
                 "Analyse",
-                "How well the readings of a recording determine each target: measured on held-out samples in seconds, \
-                 with confidence intervals of 95 % from independent stretches or groups of samples.",
+                "How well the readings of a recording determine each target, measured on held-out samples in seconds.",
             ],
             Self::Folds => [
                 "Cross-validation",
@@ -125,7 +123,7 @@ impl Topic {
 #[derive(Clone, Debug, PartialEq)]
 enum Form {
     /// A table or a sweep.
-    Experiment(ExperimentForm),
+    Experiment(Box<ExperimentForm>),
     /// Speed against accuracy.
     Speed(SpeedForm),
     /// What the readings determine, or a cross-validation with a number of folds.
@@ -139,8 +137,8 @@ impl Form {
     /// Returns the default form of a topic.
     fn new(topic: Topic) -> Self {
         match topic {
-            Topic::Table(table) => Self::Experiment(ExperimentForm::table(table)),
-            Topic::Sweep => Self::Experiment(ExperimentForm::sweep()),
+            Topic::Table(table) => Self::Experiment(ExperimentForm::table(table).into()),
+            Topic::Sweep => Self::Experiment(ExperimentForm::sweep().into()),
             Topic::Speed => Self::Speed(SpeedForm::default()),
             Topic::Readings => Self::Recording(None),
             Topic::Folds => Self::Recording(Some(5)),
@@ -160,22 +158,16 @@ impl Form {
         };
         let setup = train.clone()?;
         if setup.plan().is_none() {
-            return Err(
-                "This is about recordings: choose one as the source in the Train view. The Sensor view shows \
-                        what the readings of an array determine."
-                    .to_owned(),
-            );
+            return Err("This is about recordings: choose one in the Train view; Sensor is about arrays.".to_owned());
         }
         let trainings = folds.map_or_else(String::new, |folds| format!(", {}", counted(folds, "training")));
-        Ok(Task {
-            size: format!("{}{trainings}", setup.source_name()),
-            outcome: Box::new(None::<Report>),
-            setup: Some(setup.clone()),
-            run: Box::new(move |reporter| match folds {
-                Some(folds) => readings::cross_validate(&setup, folds, reporter),
-                None => readings::find(&setup, reporter),
-            }),
-        })
+        let (size, of) = (format!("{}{trainings}", setup.source_name()), setup.clone());
+        let mut task = Task::new(size, None::<Report>, move |reporter| match folds {
+            Some(folds) => readings::cross_validate(&of, folds, reporter),
+            None => readings::find(&of, reporter),
+        });
+        task.study.setup = Some(setup);
+        Ok(task)
     }
 
     /// Shows the fields.
@@ -193,16 +185,26 @@ impl Form {
     }
 }
 
-/// Work of a background job.
+/// Work of a background job, and the results without results.
 struct Task {
-    /// How much work it is.
-    size: String,
-    /// The outcome without results.
-    outcome: Box<dyn Outcome>,
-    /// Setup of the recording, if it is about the one of the Train view.
-    setup: Option<Setup>,
+    study: Study,
     /// Does the work, or says why that is not possible and what to do.
-    run: Box<dyn FnOnce(&Reporter) -> Result<(), String> + Send>,
+    run: Box<Work>,
+}
+
+type Work = dyn FnOnce(&Reporter) -> Result<(), String> + Send;
+
+impl Task {
+    fn new(
+        size: String,
+        outcome: impl Outcome + 'static,
+        run: impl FnOnce(&Reporter) -> Result<(), String> + Send + 'static,
+    ) -> Self {
+        Self {
+            study: Study::new(size, Box::new(outcome)),
+            run: Box::new(run),
+        }
+    }
 }
 
 /// Sending end of the events of a task.
@@ -229,6 +231,9 @@ enum StudyEvent {
     Ended(Result<(), String>),
 }
 
+/// A table and its name.
+type NamedTable<'a> = (&'static str, Box<dyn Fn() -> Table + 'a>);
+
 /// Results so far.
 trait Outcome: Debug {
     /// Adds what an event reports.
@@ -251,7 +256,7 @@ trait Outcome: Debug {
     }
 
     /// Returns tables for programs, with their names.
-    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+    fn tables(&self) -> Vec<NamedTable<'_>> {
         Vec::new()
     }
 }

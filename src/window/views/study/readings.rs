@@ -65,7 +65,7 @@ pub fn find(setup: &Setup, reporter: &Reporter) -> Result<(), String> {
         ));
     }
     let warnings = describe_warnings(&recording, by, &found).into_iter();
-    notes.extend(warnings.map(|warning| Note::Warning(sentence(&warning))));
+    notes.extend(warnings.map(|warning| Note::Line(Tone::Warning, sentence(&warning))));
     let folds = by_folds(found.record.folds, by);
     let time = format_duration(begun.elapsed());
     reporter.send(StudyEvent::Report(Box::new(Report {

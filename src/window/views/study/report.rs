@@ -12,7 +12,7 @@ use crate::window::{
     plotting::{CellPointed, Pointer, colour, heat_map_ui, plots_ui},
     theme::{Palette, Theme, semibold, type_size},
     widgets::{
-        ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, note_ui, placeholder_ui,
+        ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, placeholder_ui,
         section_heading_ui,
     },
 };
@@ -41,8 +41,6 @@ pub struct Page {
     pub rows: Vec<Row>,
     /// The figure, if there is one. The cells of a map are items, row by row.
     pub figure: Option<Figure>,
-    /// The items in the plots of the figure that answer to the pointer.
-    pub points: Vec<Point>,
     /// Everything else.
     pub notes: Vec<Note>,
 }
@@ -60,6 +58,10 @@ pub struct Row {
     pub dot: Option<Ink>,
     /// Tone of each cell.
     pub tones: Vec<Tone>,
+    /// What is known about it besides the cells.
+    pub facts: Vec<String>,
+    /// For each plot of the figure in which it answers to the pointer, the name of the quantity and its place.
+    pub places: Vec<(&'static str, [f64; 2])>,
 }
 
 /// Tone of a text.
@@ -91,17 +93,6 @@ impl Tone {
     }
 }
 
-/// An item in the plots of a figure.
-#[derive(Clone, Debug)]
-pub struct Point {
-    /// Name.
-    pub name: String,
-    /// Errors and times.
-    pub facts: Vec<String>,
-    /// Name of the quantity of each plot, and the place of the item in it.
-    pub places: [(&'static str, [f64; 2]); 2],
-}
-
 /// A line beside the figure.
 #[derive(Clone, Debug)]
 pub enum Note {
@@ -109,8 +100,6 @@ pub enum Note {
     Heading(&'static str),
     /// A sentence.
     Line(Tone, String),
-    /// A warning.
-    Warning(String),
     /// An item that is marked by a click.
     Pick(usize, String),
 }
@@ -126,19 +115,8 @@ pub struct Look {
     pub sort: SortBy,
 }
 
-/// What the user asks for.
-#[derive(Clone, Copy, Debug)]
-pub enum Wish {
-    /// Begin the task.
-    Begin,
-    /// Open this item of the page in the Train view.
-    Open(usize),
-    /// Export the decoder of this item.
-    Export(usize),
-}
-
 /// Shows the table. A click marks a row; returns the one opened by a double click.
-pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<Wish> {
+pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<usize> {
     let palette = &Theme::of(ui).palette;
     let table = &page.table;
     let titles = Vec::from_iter(table.columns.iter().map(|column| column.title()));
@@ -184,20 +162,21 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<Wish> {
             .dot(row.dot.map(|ink| colour(ink, palette)))
     };
     let view = TableView::new("study table", &columns).sorted(look.sort).clickable();
-    let (place, wish) = match view.show(ui, order.len(), row)? {
-        TableClick::Select(place) => (place, None),
-        TableClick::Open(place) => (place, Some(Wish::Open(page.rows[order[place]].item))),
+    let (place, is_opened) = match view.show(ui, order.len(), row)? {
+        TableClick::Select(place) => (place, false),
+        TableClick::Open(place) => (place, true),
         TableClick::Sort(sort) => {
             look.sort = sort;
             return None;
         }
     };
-    look.marked = Some(page.rows[order[place]].item);
-    wish
+    let item = page.rows[order[place]].item;
+    look.marked = Some(item);
+    is_opened.then_some(item)
 }
 
 /// Shows the figure. A click on a cell of a map marks it and a double click opens it; a click on a point opens it.
-pub fn figure_ui(ui: &mut Ui, page: &Page, look: &mut Look, colours: SequentialMap) -> Option<Wish> {
+pub fn figure_ui(ui: &mut Ui, page: &Page, look: &mut Look, colours: SequentialMap) -> Option<usize> {
     if page.rows.is_empty() {
         placeholder_ui(ui, "The points appear here as they are measured.");
         return None;
@@ -210,28 +189,24 @@ pub fn figure_ui(ui: &mut Ui, page: &Page, look: &mut Look, colours: SequentialM
             let ([row, column], pointed) = heat_map_ui(ui, &map, marked)?;
             let cell = row * columns + column;
             look.marked = Some(cell);
-            (pointed == CellPointed::Twice).then_some(Wish::Open(cell))
+            (pointed == CellPointed::Twice).then_some(cell)
         }
         Figure::Plots(plots) => {
-            let pointer = if page.points.is_empty() {
-                Pointer::Moves
-            } else {
-                Pointer::Picks
-            };
-            let mut wish = None;
+            let answers = page.rows.iter().any(|row| !row.places.is_empty());
+            let pointer = if answers { Pointer::Picks } else { Pointer::Moves };
+            let mut opened = None;
             for (number, drawn) in plots_ui(ui, page.what, plots, pointer).iter().enumerate() {
-                for (item, point) in page.points.iter().enumerate() {
-                    let Some(&(quantity, [x, y])) = point.places.get(number) else {
-                        continue;
-                    };
-                    let Some(at) = drawn.position(x, y) else { continue };
-                    if point_ui(ui, point, quantity, at, look.marked == Some(item)).clicked() {
-                        look.marked = Some(item);
-                        wish = Some(Wish::Open(item));
+                let placed = page.rows.iter().filter_map(|row| {
+                    let (quantity, [x, y]) = *row.places.get(number)?;
+                    Some((row, quantity, drawn.position(x, y)?))
+                });
+                for (row, quantity, at) in placed {
+                    if point_ui(ui, row, quantity, at, look.marked == Some(row.item)).clicked() {
+                        (look.marked, opened) = (Some(row.item), Some(row.item));
                     }
                 }
             }
-            wish
+            opened
         }
         // Studies have no surfaces.
         Figure::Surfaces(_) => None,
@@ -239,7 +214,7 @@ pub fn figure_ui(ui: &mut Ui, page: &Page, look: &mut Look, colours: SequentialM
 }
 
 /// Shows the name and the facts of a point under the pointer, and a ring around it there and while it is marked.
-fn point_ui(ui: &mut Ui, point: &Point, quantity: &str, at: Pos2, is_marked: bool) -> Response {
+fn point_ui(ui: &mut Ui, point: &Row, quantity: &str, at: Pos2, is_marked: bool) -> Response {
     let name = format!("{quantity}: {}", point.name);
     let rect = Rect::from_center_size(at, Vec2::splat(14.0));
     let response = ui.interact(rect, ui.scope_id().with(&name), Sense::click());
@@ -267,7 +242,6 @@ pub fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
             Note::Line(tone, text) => {
                 ui.label(RichText::new(text).size(type_size().note).color(tone.colour(&palette)));
             }
-            Note::Warning(text) => drop(note_ui(ui, text)),
             Note::Pick(item, text) => {
                 let shown = RichText::new(text).size(type_size().note).color(palette.accent);
                 let pick = ui.selectable_label(look.marked == Some(*item), shown);
@@ -280,7 +254,8 @@ pub fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
             }
         }
     }
-    if let Some(point) = look.marked.and_then(|item| page.points.get(item)) {
+    let mut described = page.rows.iter().filter(|row| !row.facts.is_empty());
+    if let Some(point) = described.find(|row| look.marked == Some(row.item)) {
         section_heading_ui(ui, "Marked point");
         ui.add(Label::new(RichText::new(&point.name).font(semibold(type_size().note))).truncate());
         dim_ui(ui, &format!("{}.", point.facts.join("; ")));

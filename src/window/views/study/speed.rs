@@ -19,18 +19,19 @@ use decoupler_core::{
     },
     job::Job,
     scene::{Noise, Scene},
+    sensor::SensorModel,
     text::counted,
     training::{Method, StoppingRules},
 };
 use decoupler_files::{
-    export::{NetworkFile, Table, format_percent, trade_off_points, trade_off_summary},
+    export::{NetworkFile, format_percent, trade_off_points, trade_off_summary},
     figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure},
-    import::{Recorded, Setup, SetupSets},
+    import::{Recorded, Setup},
     machine::memory_budget,
 };
 use eframe::egui::Ui;
 
-use super::{Note, Outcome, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
+use super::{NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
 use crate::window::{
     shared::{Effect, Exporting, NetworkSource, sentence},
     widgets::{
@@ -72,7 +73,7 @@ impl Default for SpeedForm {
         Self {
             noises: list(AxisKind::Noise, "0, 1e-4, 1e-3, 1e-2"),
             hidden: list(AxisKind::Hidden, "6, 12"),
-            methods: list(AxisKind::Method, "br, lm"),
+            methods: list(AxisKind::Method, "lm, br"),
             preset: None,
             decoders: [true; DecoderKind::ALL.len()],
             is_full: false,
@@ -95,12 +96,10 @@ impl SpeedForm {
             ..SpeedOutcome::default()
         };
         let is_quiet = Arc::clone(is_quiet);
-        Ok(Task {
-            size: counted(plan.points(), "point"),
-            outcome: Box::new(outcome),
-            setup: None,
-            run: Box::new(move |reporter| measure(&plan, &is_quiet, reporter)),
-        })
+        let size = counted(plan.points(), "point");
+        Ok(Task::new(size, outcome, move |reporter| {
+            measure(&plan, &is_quiet, reporter)
+        }))
     }
 
     fn plan(&self, base: &Setup) -> Result<SpeedPlan, String> {
@@ -138,50 +137,54 @@ impl SpeedForm {
         for noise in self.noises.numbers()? {
             let presets = Preset::ALL.into_iter();
             let presets = presets.filter(|preset| self.preset.is_none_or(|only| only == *preset));
+            let scene = Scene {
+                noise: Noise {
+                    relative: noise,
+                    ..base.scene.noise
+                },
+                ..base.scene
+            };
+            scene.check().map_err(|error| error.to_string())?;
             runs.extend(presets.map(|preset| PlannedRun {
                 noise: Some(noise),
                 preset: Some(preset),
-                setup: self.settings(base, seed, preset, noise).into(),
+                setup: self.settings(base.sensor, scene, seed, preset).into(),
                 decoders: decoders.to_vec(),
             }));
         }
         Ok(runs)
     }
 
-    /// Returns the settings of a preset at a noise level, with the sensor and the scene of `base`. The preset
-    /// determines the rows that are read and the inputs of the networks.
-    fn settings(&self, base: &Simulation, seed: Seed, preset: Preset, noise: f64) -> RunSettings {
-        let noise = Noise {
-            relative: noise,
-            ..base.scene.noise
-        };
-        let of_preset = preset.simulation_in(noise);
-        let mut source = Simulation {
-            sensor: base.sensor,
-            scene: Scene {
-                rows: of_preset.scene.rows,
-                noise,
-                ..base.scene
-            },
+    /// Returns the settings of a preset with this sensor and scene. The preset determines the rows that are read and the
+    /// inputs of the networks.
+    fn settings(&self, sensor: SensorModel, scene: Scene, seed: Seed, preset: Preset) -> RunSettings {
+        let of_preset = preset.simulation_in(scene.noise);
+        let rows = of_preset.scene.rows;
+        let source = Simulation {
+            sensor,
+            scene: Scene { rows, ..scene },
             test_samples: self.test_samples,
             ..of_preset
         };
-        let mut settings = preset.settings_in(noise);
-        if !self.is_full {
-            source.samples = source.samples.min(self.samples);
-            source.validation_samples = source.validation_samples.min(source.samples.div_ceil(5));
-            self.shorten(&mut settings);
-        }
-        RunSettings {
+        self.shortened(RunSettings {
             source: source.into(),
             seed,
-            ..settings
-        }
+            ..preset.settings_in(scene.noise)
+        })
     }
 
-    fn shorten(&self, settings: &mut RunSettings) {
+    /// Returns the settings of a quick look, unless the form asks for full trainings.
+    fn shortened(&self, mut settings: RunSettings) -> RunSettings {
+        if self.is_full {
+            return settings;
+        }
         let epochs = &mut settings.training.stopping.epochs;
         *epochs = (*epochs).min(self.epochs);
+        if let Some(array) = settings.simulation_mut() {
+            array.samples = array.samples.min(self.samples);
+            array.validation_samples = array.validation_samples.min(array.samples.div_ceil(5));
+        }
+        settings
     }
 
     /// Returns a run for each method, on the recording of `base`. Decoders without a network do not depend on the method, so
@@ -203,9 +206,7 @@ impl SpeedForm {
             if method.short_name() != present.short_name() {
                 settings.choose_method(method);
             }
-            if !self.is_full {
-                self.shorten(&mut settings);
-            }
+            let settings = self.shortened(settings);
             let mut plan = base.plan().cloned().ok_or("This is not a recording.")?;
             // A share set by the user is kept.
             if plan.division.validation_fraction == Some(base.settings().validation_fraction()) {
@@ -226,8 +227,7 @@ impl SpeedForm {
     /// Shows the fields; `is_array` for a simulated array.
     pub fn fields_ui(&mut self, ui: &mut Ui, is_array: bool) {
         if is_array {
-            let hint = "Noise of each reading (standard deviation), relative to the reading. Separate several levels \
-                        with commas.";
+            let hint = "Noise of each reading (standard deviation), relative to the reading, separated by commas.";
             self.noises.ui(ui, None, hint);
         }
         let hint = "Numbers of hidden nodes of the networks, separated by commas.";
@@ -278,11 +278,9 @@ impl SpeedForm {
 /// Shows the limits for the recommended decoders, which apply to the results that are shown.
 pub fn limits_ui(ui: &mut Ui, limits: &mut TradeOffLimits) {
     section_heading_ui(ui, "Recommended decoders");
-    let hint = "Finds the decoder with the shortest decoding time among those whose Z error, or mean absolute error in \
-                percent of the range of a recording's targets, is at most this.";
+    let hint = "Finds the fastest decoder whose error (of Z, or in percent of the range of a target) is at most this.";
     quantity_ui(ui, "Fastest under", hint, &mut limits.percent, 1e-15..=1e6, "%");
-    let hint = "Finds the decoder with the smallest error among those that decode a frame, or a sample of a recording, \
-                within this time, in µs.";
+    let hint = "Finds the most accurate decoder of a frame, or of a sample of a recording, within this time.";
     let time = &mut limits.microseconds;
     quantity_ui(ui, "Most accurate under", hint, time, 1e-6..=1e12, "µs");
 }
@@ -333,22 +331,15 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
         reporter.is_cancelled()
     };
     let job = Job::new(&is_cancelled);
-    let mut last: Option<(&Setup, SetupSets)> = None;
     for (number, run) in plan.runs.iter().enumerate() {
         if run.setup.plan().is_none() {
             let workload = Workload::of_trade_off(run.setup.settings(), &plan.hidden, &run.decoders);
             let checked = workload.and_then(|workload| workload.check_memory(memory_budget()));
             checked.map_err(|error| error.to_string())?;
         }
-        let sets = match last.take() {
-            // The samples of a recording are read only once.
-            Some((of, sets)) if of.plan().is_some() && of.plan() == run.setup.plan() => sets,
-            _ => {
-                let on_progress = &mut |progress| reporter.progress(StudyEvent::Reading(progress), |_, _| ());
-                let sets = run.setup.sets(Path::new(""), &job, on_progress);
-                sets.map_err(|error| error.to_string())?
-            }
-        };
+        let on_progress = &mut |progress| reporter.progress(StudyEvent::Reading(progress), |_, _| ());
+        let sets = run.setup.sets(Path::new(""), &job, on_progress);
+        let sets = sets.map_err(|error| error.to_string())?;
         let recorded = sets.recorded();
         let unit = decoded_unit(&sets.sets.test);
         reporter.send(StudyEvent::Samples(number, unit, recorded.cloned().map(Box::new)));
@@ -362,7 +353,6 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
         let settings = run.setup.settings();
         let measured = measure_trade_off(settings, &sets.sets, &plan.hidden, &run.decoders, &job, on_point);
         measured.map_err(|error| error.to_string())?;
-        last = Some((&run.setup, sets));
     }
     Ok(())
 }
@@ -400,7 +390,6 @@ impl SpeedOutcome {
             rows: rows(level, table.columns.len()),
             table,
             figure: Some(trade_off_figure(level, limits).into()),
-            points: level.points.iter().map(point).collect(),
             notes: self.notes(number, limits),
         }
     }
@@ -408,7 +397,7 @@ impl SpeedOutcome {
     fn notes(&self, number: usize, limits: &TradeOffLimits) -> Vec<Note> {
         let level = &self.levels[number];
         let refused = self.refused.iter().filter(|(of, _)| *of == number);
-        let mut notes = Vec::from_iter(refused.map(|(_, reason)| Note::Warning(sentence(reason))));
+        let mut notes = Vec::from_iter(refused.map(|(_, reason)| Note::Line(Tone::Warning, sentence(reason))));
         notes.push(Note::Heading("Recommended decoders"));
         let questions = [
             ("Fastest", "No measured decoder is this accurate."),
@@ -483,7 +472,7 @@ impl Outcome for SpeedOutcome {
         Some(Exporting::decoder(of_point.report.kind, source))
     }
 
-    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+    fn tables(&self) -> Vec<NamedTable<'_>> {
         vec![("All points", Box::new(|| trade_off_points(&self.levels)))]
     }
 }
@@ -495,33 +484,31 @@ fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
     let mut order = Vec::from_iter(0..level.points.len());
     order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
     let row = |item: usize| {
+        let point = &level.points[item];
+        let cost = |cost: TradeOffCost| cost.of(point).into();
+        let mut facts = point_facts(point);
+        facts.push(format!(
+            "at most {}",
+            counted(point.settings.training.stopping.epochs, "epoch")
+        ));
         let of_cost = |is_on_front| if is_on_front { Tone::Own } else { Tone::Usual };
         let mut tones = vec![Tone::Usual; columns];
         // The last columns are the costs.
         tones[columns - 2..].copy_from_slice(&[decoding[item], training[item]].map(of_cost));
         Row {
             item,
-            name: point_name(&level.points[item]),
+            name: point_name(point),
             meaning: "A blue time is on the Pareto front: no other point has as small an error in as little time.",
-            dot: Some(Ink::of_decoder(level.points[item].report.kind)),
+            dot: Some(Ink::of_decoder(point.report.kind)),
             tones,
+            facts,
+            places: vec![
+                ("Decoding", cost(TradeOffCost::Decoding)),
+                ("Training", cost(TradeOffCost::Training)),
+            ],
         }
     };
     order.into_iter().map(row).collect()
-}
-
-fn point(point: &TradeOffPoint) -> Point {
-    let [decoding, training] = TradeOffCost::ALL.map(|cost| cost.of(point).into());
-    let mut facts = point_facts(point);
-    facts.push(format!(
-        "at most {}",
-        counted(point.settings.training.stopping.epochs, "epoch")
-    ));
-    Point {
-        name: point_name(point),
-        facts,
-        places: [("Decoding", decoding), ("Training", training)],
-    }
 }
 
 #[cfg(test)]
@@ -593,12 +580,12 @@ mod tests {
             });
             Vec::from_iter(held_out)
         };
-        assert_eq!(held_out(&of), [("br", 0.0), ("lm", 0.2)]);
+        assert_eq!(held_out(&of), [("lm", 0.2), ("br", 0.0)]);
         // A share set by the user applies to every method.
         let mut chosen = Plan::default();
         chosen.division.validation_fraction = Some(0.3);
         let of = plan(&SpeedForm::default(), recording(&chosen));
-        assert_eq!(held_out(&of), [("br", 0.3), ("lm", 0.3)]);
+        assert_eq!(held_out(&of), [("lm", 0.3), ("br", 0.3)]);
     }
 
     #[test]
@@ -609,7 +596,7 @@ mod tests {
             form.plan(&RunSettings::default().into()).unwrap_err()
         };
         assert!(error(|form| form.noises.values = "0, much".to_owned()).contains("'much' is not a number"));
-        assert!(error(|form| form.noises.values = "2".to_owned()).contains("give from 0 to 1"));
+        assert!(error(|form| form.noises.values = "2".to_owned()).contains("relative noise"));
         assert!(error(|form| form.noises.values = " , ".to_owned()).contains("there are no values"));
         assert!(error(|form| form.decoders.fill(false)).contains("choose at least one"));
         let many = error(|form| {

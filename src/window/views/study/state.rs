@@ -21,7 +21,7 @@ use eframe::egui::{Sense, Ui};
 
 use super::{
     Form, Outcome, Report, StudyEvent, Task, Topic,
-    report::{Look, Wish},
+    report::Look,
     sweep_folder,
     view::{exports, form_ui, invited_ui, report_ui},
 };
@@ -46,10 +46,9 @@ pub struct StudyView {
     pub(super) train: Result<Setup, String>,
     /// The task of the form, or the reason why there is none.
     pub(super) task: Result<Task, String>,
-    /// The results of the task without results: the published figures of a table.
-    preview: Report,
     pub(super) studies: HashMap<Topic, Study>,
-    pub(super) running: Option<Running>,
+    /// The topic whose task is under way.
+    pub(super) running: Option<Topic>,
     pub(super) look: Look,
     /// Folders of sweeps that were chosen.
     pub(super) folders: (Sender<PathBuf>, Receiver<PathBuf>),
@@ -66,24 +65,19 @@ pub struct Study {
     pub(super) outcome: Box<dyn Outcome>,
     /// The outcome, ready to be shown.
     pub(super) report: Report,
-    /// Setup of the recording that was studied.
-    setup: Option<Setup>,
-    /// How much work it is.
-    size: String,
-    /// Time it took, once it has ended.
-    took: Option<Duration>,
-    /// True once a table of it has been saved.
-    pub(super) is_saved: Arc<AtomicBool>,
-}
-
-/// The task under way.
-pub struct Running {
-    pub(super) topic: Topic,
+    /// Setup of the recording that is studied, if it is that of the Train view.
+    pub(super) setup: Option<Setup>,
+    /// How much work it is; empty for a sweep folder, which is no work of this program.
+    pub(super) size: String,
     begun: Instant,
     /// Progress of reading a file.
     reading: Option<Progress>,
     /// Estimated time of the remaining trials, once there is one.
     pub(super) time_left: Option<Duration>,
+    /// Time it took, once it has ended.
+    took: Option<Duration>,
+    /// True once a table of it has been saved.
+    pub(super) is_saved: Arc<AtomicBool>,
 }
 
 impl fmt::Debug for StudyView {
@@ -104,7 +98,6 @@ impl StudyView {
             checked_on: None,
             train: Err(String::new()),
             task: Err(String::new()),
-            preview: Report::default(),
             studies: HashMap::new(),
             running: None,
             look: Look::default(),
@@ -139,8 +132,9 @@ impl StudyView {
         }
         self.train = shared.setup();
         self.task = self.forms[&self.topic].task(&self.train, &self.is_quiet);
-        let preview = self.task.as_ref().map(|task| task.outcome.report(&self.limits));
-        self.preview = preview.unwrap_or_default();
+        if let Ok(Task { study, .. }) = &mut self.task {
+            study.report = study.outcome.report(&self.limits);
+        }
         self.checked_on = Some(basis);
     }
 
@@ -166,24 +160,15 @@ impl StudyView {
         }
     }
 
-    fn start(&mut self, task: Task) {
-        let study = Study {
-            report: task.outcome.report(&self.limits),
-            outcome: task.outcome,
-            setup: task.setup,
-            size: task.size,
-            took: None,
-            is_saved: Arc::default(),
-        };
-        self.studies.insert(self.topic, study);
-        self.running = Some(Running {
-            topic: self.topic,
-            begun: Instant::now(),
-            reading: None,
-            time_left: None,
-        });
+    fn start(&mut self, Task { study, run }: Task) {
+        if self.is_folder() {
+            self.cancel();
+        }
+        let begun = Instant::now();
+        self.studies.insert(self.topic, Study { begun, ..study });
+        self.running = Some(self.topic);
+        self.refresh(self.topic);
         self.look.marked = None;
-        let run = task.run;
         self.job.start(
             move |reporter| reporter.unless_cancelled(run(reporter)),
             |ended| {
@@ -203,12 +188,12 @@ impl StudyView {
     }
 
     fn end(&mut self) {
-        let Some(running) = self.running.take() else { return };
-        self.refresh(running.topic);
-        let study = self.studies.get_mut(&running.topic);
+        let Some(topic) = self.running.take() else { return };
+        self.refresh(topic);
+        let study = self.studies.get_mut(&topic);
         match study.filter(|study| study.outcome.parts().0 > 0) {
-            Some(study) => study.took = Some(running.begun.elapsed()),
-            None => drop(self.studies.remove(&running.topic)),
+            Some(study) => study.took = Some(study.begun.elapsed()),
+            None => drop(self.studies.remove(&topic)),
         }
     }
 
@@ -221,11 +206,12 @@ impl StudyView {
 
     /// Returns true while a measurement of times waits for other work.
     pub(super) fn is_waiting(&self) -> bool {
-        let measures = self
-            .running
-            .as_ref()
-            .is_some_and(|running| running.topic == Topic::Speed);
-        measures && !self.is_quiet.load(Ordering::Relaxed)
+        self.running == Some(Topic::Speed) && !self.is_quiet.load(Ordering::Relaxed)
+    }
+
+    /// Returns the results of the task under way.
+    pub(super) fn under_way(&self) -> Option<&Study> {
+        self.studies.get(&self.running?)
     }
 
     /// Returns the results of the topic.
@@ -233,11 +219,9 @@ impl StudyView {
         self.studies.get(&self.topic)
     }
 
-    /// Returns true while a sweep folder is shown, which is no work of this program.
+    /// Returns true while a sweep folder is shown.
     pub(super) fn is_folder(&self) -> bool {
-        let running = self.running.as_ref();
-        let study = running.and_then(|running| self.studies.get(&running.topic));
-        study.is_some_and(|study| study.size.is_empty())
+        self.under_way().is_some_and(|study| study.size.is_empty())
     }
 
     /// Returns true if the results are of another recording or other settings than the Train view has now.
@@ -248,23 +232,26 @@ impl StudyView {
 
     /// Returns the report to show: the results or, before there are any, the published figures.
     fn displayed(&self) -> Option<&Report> {
-        let study = self.study().map(|study| &study.report);
-        let preview = Some(&self.preview).filter(|preview| preview.pages.iter().any(|page| !page.rows.is_empty()));
-        study.or(preview).filter(|report| !report.pages.is_empty())
+        let has_rows = |study: &&Study| study.report.pages.iter().any(|page| !page.rows.is_empty());
+        let preview = self.task.as_ref().ok().map(|task| &task.study).filter(has_rows);
+        let report = self.study().or(preview).map(|study| &study.report);
+        report.filter(|report| !report.pages.is_empty())
     }
 
     /// Returns how far the task under way is, as a share and in words.
     pub(super) fn progress(&self) -> Option<(f32, String)> {
-        let running = self.running.as_ref()?;
-        if let Some(Progress { bytes, of }) = running.reading {
+        let (topic, study) = (self.running?, self.under_way()?);
+        if let Some(Progress { bytes, of }) = study.reading {
             let share = of.filter(|of| *of > 0).map_or(0.0, |of| bytes as f32 / of as f32);
             return Some((share, format!("Reading the files… {:.0} %", 100.0 * share)));
         }
-        let (name, study) = (running.topic.name(), self.studies.get(&running.topic)?);
         Some(match study.outcome.parts() {
             _ if self.is_folder() => (1.0, study.report.headline.clone()),
-            (.., "") => (0.0, format!("{name}…")),
-            (done, all, _) => (done as f32 / all.max(1) as f32, format!("{name}: {}", study.standing())),
+            (.., "") => (0.0, format!("{}…", topic.name())),
+            (done, all, _) => {
+                let share = done as f32 / all.max(1) as f32;
+                (share, format!("{}: {}", topic.name(), study.standing()))
+            }
         })
     }
 }
@@ -277,11 +264,13 @@ impl View for StudyView {
         self.check(shared);
         let mut changed = None;
         while let Some(event) = self.job.next_event() {
-            let Some(running) = &mut self.running else { break };
-            running.reading = None;
-            changed = Some(running.topic);
+            changed = self.running;
+            let Some(study) = changed.and_then(|topic| self.studies.get_mut(&topic)) else {
+                break;
+            };
+            study.reading = None;
             match event {
-                StudyEvent::Reading(progress) => running.reading = Some(progress),
+                StudyEvent::Reading(progress) => study.reading = Some(progress),
                 StudyEvent::Ended(ended) => {
                     let failure = ended.err().map(Notice::Failed);
                     effects.extend(failure.map(|failure| Effect::Notify(Matter::Study, failure)));
@@ -289,11 +278,9 @@ impl View for StudyView {
                 }
                 event => {
                     if let StudyEvent::Trial(finished) = &event {
-                        running.time_left = finished.time_left;
+                        study.time_left = finished.time_left;
                     }
-                    if let Some(study) = self.studies.get_mut(&running.topic) {
-                        study.outcome.take(event);
-                    }
+                    study.outcome.take(event);
                 }
             }
         }
@@ -301,7 +288,7 @@ impl View for StudyView {
             self.refresh(topic);
         }
         if let Ok(path) = self.folders.1.try_recv()
-            && self.running.is_none()
+            && self.is_idle()
         {
             self.choose(Topic::Sweep);
             self.start(sweep_folder::task(path));
@@ -320,7 +307,7 @@ impl View for StudyView {
     fn holdings(&self, _shared: &Shared) -> Holdings {
         let unfinished = |topic: Topic| {
             let study = self.studies.get(&topic)?;
-            let is_running = self.running.as_ref().is_some_and(|running| running.topic == topic);
+            let is_running = self.running == Some(topic);
             let (done, all, part) = study.outcome.parts();
             let is_unsaved = done == all && !part.is_empty() && !study.is_saved.load(Ordering::Relaxed);
             let standing = study.standing();
@@ -349,25 +336,15 @@ impl View for StudyView {
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         let whole = ui.available_rect_before_wrap();
-        let (mut look, mut wish) = (self.look, None);
+        let (mut look, mut is_wanted) = (self.look, false);
         match self.displayed() {
-            Some(report) => wish = report_ui(ui, self, report, &mut look, shared),
-            None => card_ui(ui, whole, |ui| wish = invited_ui(ui, self)),
+            Some(report) => is_wanted = report_ui(ui, self, report, &mut look, shared, effects),
+            None => card_ui(ui, whole, |ui| is_wanted = invited_ui(ui, self)),
         }
         ui.allocate_rect(whole, Sense::hover());
         self.look = look;
-        match wish {
-            Some(Wish::Begin) => self.begin(effects),
-            Some(Wish::Open(item)) if !shared.phase.is_busy() => {
-                let study = self.study();
-                effects.extend(study.iter().flat_map(|study| study.outcome.open(look.page, item)));
-                effects.push(Effect::ShowTraining);
-            }
-            Some(Wish::Export(item)) => {
-                let decoder = self.study().and_then(|study| study.outcome.decoder(look.page, item));
-                effects.extend(decoder.map(|decoder| Effect::Export(Box::new(decoder))));
-            }
-            Some(Wish::Open(_)) | None => {}
+        if is_wanted {
+            self.begin(effects);
         }
         let ended = self.study().and_then(|study| Some((study, study.took?)));
         Some(match (self.progress(), ended) {
@@ -387,6 +364,20 @@ impl View for StudyView {
 }
 
 impl Study {
+    pub(super) fn new(size: String, outcome: Box<dyn Outcome>) -> Self {
+        Self {
+            outcome,
+            report: Report::default(),
+            setup: None,
+            size,
+            begun: Instant::now(),
+            reading: None,
+            time_left: None,
+            took: None,
+            is_saved: Arc::default(),
+        }
+    }
+
     /// Returns how much is done: "2 of 800 trials".
     fn standing(&self) -> String {
         match self.outcome.parts() {

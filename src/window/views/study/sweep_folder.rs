@@ -30,15 +30,11 @@ const WAIT: Duration = Duration::from_millis(50);
 
 /// Returns the task that shows the folder until it is cancelled.
 pub fn task(path: PathBuf) -> Task {
-    Task {
-        size: String::new(),
-        outcome: Box::new(Some(report(&path, "Reading the folder…", Page::default()))),
-        setup: None,
-        run: Box::new(move |reporter| {
-            watch(&path, reporter);
-            Ok(())
-        }),
-    }
+    let empty = report(&path, "Reading the folder…", Page::default());
+    Task::new(String::new(), Some(empty), move |reporter| {
+        watch(&path, reporter);
+        Ok(())
+    })
 }
 
 /// Reads the folder whenever its files change.
@@ -54,7 +50,7 @@ fn watch(path: &Path, reporter: &Reporter) {
                     report(path, &text, page(&merged))
                 }
                 Err(error) => {
-                    let notes = vec![Note::Warning(error.to_string())];
+                    let notes = vec![Note::Line(Tone::Warning, error.to_string())];
                     report(
                         path,
                         "",
@@ -141,7 +137,7 @@ fn page(merged: &MergedSweep) -> Page {
         what: "Trial",
         rows: (0..trials.len()).map(row).collect(),
         table: Table::of_headings(headings, (0..trials.len()).map(cells_of)),
-        notes: problems.map(Note::Warning).collect(),
+        notes: problems.map(|text| Note::Line(Tone::Warning, text)).collect(),
         ..Page::default()
     }
 }

@@ -65,7 +65,15 @@ impl ValueList {
             Value::Number(value) => *value,
             Value::Text(_) => f64::NAN,
         });
-        Ok(numbers.collect())
+        let numbers = Vec::from_iter(numbers);
+        let range = self.kind.setting().range().unwrap_or(f64::MIN..=f64::MAX);
+        match numbers.iter().find(|number| !range.contains(number)) {
+            Some(number) => {
+                let (name, [min, max]) = (self.kind.name(), [range.start(), range.end()]);
+                Err(format!("{name}: {number} is not possible, give from {min} to {max}"))
+            }
+            None => Ok(numbers),
+        }
     }
 
     /// Shows the list as a text field, named after its setting unless `name` is given.

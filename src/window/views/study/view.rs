@@ -6,7 +6,7 @@ use eframe::egui::{Align, Button, Key, Label, Layout, RichText, Ui, vec2};
 
 use super::{
     Form, Report, StudyView, Topic,
-    report::{Look, Wish, figure_ui, notes_ui, table_ui},
+    report::{Look, figure_ui, notes_ui, table_ui},
     speed::limits_ui,
     sweep_folder::FOLDER,
 };
@@ -38,7 +38,7 @@ pub fn form_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
     let mut form = view.forms[&topic].clone();
     ui.add_enabled_ui(is_idle, |ui| form.fields_ui(ui, &view.train));
     match &view.task {
-        Ok(task) => dim_ui(ui, &task.size),
+        Ok(task) => dim_ui(ui, &task.study.size),
         Err(problem) => note_ui(ui, problem),
     };
     ui.add_space(space(2));
@@ -76,7 +76,7 @@ fn buttons_ui(ui: &mut Ui, view: &mut StudyView, verb: &str, effects: &mut Vec<E
         let begin = primary_button_of(format!("▶ {verb}"), size);
         let begin = ui.add_enabled(view.can_begin(), begin);
         let why_not = match &view.running {
-            Some(running) => format!("{} is under way", running.topic.name()),
+            Some(topic) => format!("{} is under way", topic.name()),
             None => "The note above says what to change".to_owned(),
         };
         let hint = with_shortcut(ui, "Begins in the background", Key::Enter);
@@ -92,8 +92,7 @@ fn buttons_ui(ui: &mut Ui, view: &mut StudyView, verb: &str, effects: &mut Vec<E
     let Some((share, text)) = view.progress() else { return };
     ui.add_space(space(1));
     progress_bar_ui(ui, "Study", share, &text);
-    let left = view.running.as_ref().and_then(|running| running.time_left);
-    if let Some(left) = left {
+    if let Some(left) = view.under_way().and_then(|study| study.time_left) {
         dim_ui(ui, &format!("about {} left", format_duration(left)));
     }
     if view.is_waiting() {
@@ -103,7 +102,7 @@ fn buttons_ui(ui: &mut Ui, view: &mut StudyView, verb: &str, effects: &mut Vec<E
 }
 
 /// Says what there will be, or why there is nothing, and offers to begin.
-pub fn invited_ui(ui: &mut Ui, view: &StudyView) -> Option<Wish> {
+pub fn invited_ui(ui: &mut Ui, view: &StudyView) -> bool {
     let [_, verb, meaning] = view.topic.words();
     let text = match (&view.task, view.topic) {
         _ if view.running.is_some() => "The results appear here when the work has finished.",
@@ -112,11 +111,18 @@ pub fn invited_ui(ui: &mut Ui, view: &StudyView) -> Option<Wish> {
         (Ok(_), _) => meaning,
     };
     let button = format!("{verb} now");
-    invitation_ui(ui, text, &button, view.can_begin()).then_some(Wish::Begin)
+    invitation_ui(ui, text, &button, view.can_begin())
 }
 
-/// Shows a page of a report: title, conditions and table above, figure and notes below.
-pub fn report_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shared: &Shared) -> Option<Wish> {
+/// Shows a page of a report: title, conditions and table above, figure and notes below. Returns true if the user begins.
+pub fn report_ui(
+    ui: &mut Ui,
+    view: &StudyView,
+    report: &Report,
+    look: &mut Look,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) -> bool {
     look.page = look.page.min(report.pages.len() - 1);
     let page = &report.pages[look.page];
     let whole = ui.available_rect_before_wrap();
@@ -125,7 +131,7 @@ pub fn report_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look
     let has_aside = is_preview || !page.notes.is_empty();
     let height = match (has_table, page.figure.is_some() || has_aside) {
         (true, true) => (space(6) * page.rows.len() as f32 + space(28)).min(0.53 * whole.height()),
-        (false, true) => space(18),
+        (false, true) => space(20),
         (_, false) => whole.height(),
     };
     let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height.round());
@@ -136,42 +142,53 @@ pub fn report_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look
         (false, _) => 0.0,
     };
     let (left, right) = lower.split_left_right_at_x(lower.left() + (share * lower.width()).round());
-    let mut wish = None;
+    let (mut opened, mut is_wanted) = (None, false);
     card_ui(ui, upper, |ui| {
-        wish = head_ui(ui, view, report, look, shared);
+        opened = head_ui(ui, view, report, look, shared, effects);
         dim_ui(ui, &report.conditions);
         if has_table {
-            wish = wish.or(table_ui(ui, page, look));
+            opened = opened.or(table_ui(ui, page, look));
         }
     });
     if page.figure.is_some() {
         card_ui(ui, left, |ui| {
-            wish = wish.or(figure_ui(ui, page, look, shared.look.colours));
+            opened = opened.or(figure_ui(ui, page, look, shared.look.colours));
         });
     }
     if has_aside {
         let gap = if share > 0.0 { space(2) } else { 0.0 };
         card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
             if is_preview {
-                wish = wish.or(invited_ui(ui, view));
+                is_wanted = invited_ui(ui, view);
             } else {
                 scrolled_ui(ui, "notes", |ui| notes_ui(ui, page, look));
             }
         });
     }
-    wish
+    if let (Some(item), Some(study), false) = (opened, view.study(), shared.phase.is_busy()) {
+        let open = study.outcome.open(look.page, item);
+        effects.extend(open.into_iter().chain([Effect::ShowTraining]));
+    }
+    is_wanted
 }
 
 /// Shows the title, the choice of the page, and what can be done with the marked item.
-fn head_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shared: &Shared) -> Option<Wish> {
-    let mut wish = None;
+fn head_ui(
+    ui: &mut Ui,
+    view: &StudyView,
+    report: &Report,
+    look: &mut Look,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) -> Option<usize> {
+    let mut opened = None;
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if view.is_outdated() {
                 dim_ui(ui, "The recording or the settings have changed since: begin again.");
             } else if view.study().is_none_or(|study| !study.outcome.parts().2.is_empty()) {
-                wish = marked_ui(ui, view, *look, shared);
+                opened = marked_ui(ui, view, *look, shared, effects);
             }
             let names = report.pages.iter().map(|page| page.name.as_str()).enumerate();
             let names = Vec::from_iter(names.filter(|(_, name)| !name.is_empty()));
@@ -188,11 +205,11 @@ fn head_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shar
             });
         });
     });
-    wish
+    opened
 }
 
 /// Shows the buttons that open the marked item in the Train view, and export its decoder.
-fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared) -> Option<Wish> {
+fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared, effects: &mut Vec<Effect>) -> Option<usize> {
     let why_not = match look.marked {
         Some(_) => "A training is running in the Train view: its settings cannot be changed now",
         None => "Click a row of the table or an item of the figure first",
@@ -203,25 +220,27 @@ fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared) -> Opti
     let open = open.on_hover_text(hint).on_disabled_hover_text(why_not);
     let marked = look.marked?;
     let decoder = view.study().and_then(|study| study.outcome.decoder(look.page, marked));
-    if decoder.is_some() && ui.add(ghost_button("Export this decoder…")).clicked() {
-        return Some(Wish::Export(marked));
+    if let Some(decoder) = decoder
+        && ui.add(ghost_button("Export this decoder…")).clicked()
+    {
+        effects.push(Effect::Export(Box::new(decoder)));
     }
-    open.clicked().then_some(Wish::Open(marked))
+    open.clicked().then_some(marked)
 }
 
 const SPECIFICATION: FileWords = FileWords {
     kind: "specification",
-    description: "This sweep for the terminal, on one machine or many: decoupler sweep trains it, or a part of it, and \
-                  fills a folder.",
+    description: "This sweep for the command decoupler sweep, which trains it, or a part of it, and fills a folder.",
     extensions: &["json"],
 };
 
 /// Sweeps on other machines: saves the sweep of the form as a specification, opens a folder that is being filled.
 fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
     section_heading_ui(ui, "On many machines");
-    let text = "The command decoupler sweep trains a specification on any number of machines and fills a folder, which is \
-                shown here.";
-    dim_ui(ui, text);
+    dim_ui(
+        ui,
+        "The command decoupler sweep trains a specification anywhere and fills a folder, which is shown here.",
+    );
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.y = space(1);
         let save = ui.add_enabled(view.task.is_ok(), ghost_button("Save specification…"));
@@ -236,7 +255,7 @@ fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
             });
             effects.push(Effect::ChooseFile(task));
         }
-        let open = ui.add(ghost_button("Open sweep folder…"));
+        let open = ui.add_enabled(view.is_idle(), ghost_button("Open sweep folder…"));
         let open = open.on_hover_text("Shows the trials of a folder that decoupler sweep fills, as they finish.");
         if open.clicked() {
             let task = FileTask::choose(FOLDER, "", view.folders.0.clone());

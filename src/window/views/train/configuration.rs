@@ -34,8 +34,13 @@ pub fn configuration_ui(
     let (mut settings, mut picked) = (before, None);
     scrolled_ui(ui, "configuration", |ui| {
         ui.add_space(space(2));
+        let sources = [
+            (SourceKind::Array, "Simulated array"),
+            (SourceKind::Recording, "Recording"),
+        ];
         ui.add_enabled_ui(!shared.phase.is_busy(), |ui| {
-            source_choice_ui(ui, shared.source, effects);
+            let picked = segmented_ui(ui, "Source", &sources, shared.source, true);
+            effects.extend(picked.map(Effect::ChooseSource));
         });
         ui.add_space(space(2));
         let mut fields = Fields::new(&mut settings);
@@ -54,17 +59,6 @@ pub fn configuration_ui(
         });
     }
     picked
-}
-
-/// The choice between the simulated array and a recording.
-fn source_choice_ui(ui: &mut Ui, source: SourceKind, effects: &mut Vec<Effect>) {
-    let options = [
-        (SourceKind::Array, "Simulated array"),
-        (SourceKind::Recording, "Recording"),
-    ];
-    if let Some(source) = segmented_ui(ui, "Source", &options, source, true) {
-        effects.push(Effect::ChooseSource(source));
-    }
 }
 
 /// The settings of either source. Returns the paper's figure that the user picked.

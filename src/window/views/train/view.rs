@@ -63,17 +63,18 @@ impl View for TrainView {
             _ => (Command::PauseTraining, Effect::Pause),
         };
         let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-        let open = Effect::ChooseFile(self.recording.open_task());
         for (command, is_possible, effect) in [
             (Command::Train, !phase.is_busy(), Effect::Train),
             (Command::TrainLonger, shared.can_continue(), Effect::Continue),
             (pause, can_pause, paused),
             (Command::StopTraining, phase.is_busy(), Effect::Stop),
-            (Command::OpenFiles, !phase.is_busy(), open),
         ] {
             if offers.offer(command, is_possible) {
                 effects.push(effect);
             }
+        }
+        if offers.offer(Command::OpenFiles, !phase.is_busy()) {
+            effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
         if shared.source == SourceKind::Array
             && offers.offer(Command::PressMiddle, shared.test().is_some())

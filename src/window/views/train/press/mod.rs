@@ -45,11 +45,14 @@ pub struct PressState {
     /// The actual surface as last drawn.
     target: Option<Target>,
     /// The latest answer, or why there is none, with its question.
-    answered: Option<(Question, Result<Shown, String>)>,
-    solving: Background<Result<(Question, Result<Shown, String>), JobError>>,
+    answered: Option<Answered>,
+    solving: Background<Result<Answered, JobError>>,
     comparison: Comparison,
     demo: Demo,
 }
+
+/// A question with its answer, or why there is none.
+type Answered = (Question, Result<Shown, String>);
 
 impl PressState {
     /// Nothing pressed. `wake` is called when something was computed in the background.

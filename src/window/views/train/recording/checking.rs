@@ -1,6 +1,6 @@
-//! Check of the import in the background: numbers of samples, rows dropped, and warnings.
+//! Check of the import: numbers of samples, rows dropped, and warnings.
 
-use std::{ops::ControlFlow, path::Path, sync::Arc};
+use std::path::Path;
 
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy},
@@ -12,14 +12,11 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{describe_positions, format_number},
-    import::{Cure, FileReport, ImportError, Plan, Recording},
+    import::{Cure, FileReport, ImportError, Plan, Recording, Watch},
 };
 
 use super::{import::file_name, options::bias};
-use crate::window::{
-    job::{Background, JobError, Report, Wake},
-    shared::sentence,
-};
+use crate::window::shared::sentence;
 
 /// Outcome of an import.
 #[derive(Debug)]
@@ -34,63 +31,12 @@ pub(super) struct Checked {
     pub(super) warnings: Vec<String>,
 }
 
-/// Current check, and the outcome of the last one.
-#[derive(Debug)]
-pub(super) struct Checking {
-    job: Background<Result<Checked, String>>,
-    asked: Option<(Arc<Plan>, Seed)>,
-    /// Its outcome, once it is known.
-    pub(super) checked: Option<Result<Checked, String>>,
-}
-
-impl Checking {
-    pub(super) fn new(wake: Wake) -> Self {
-        Self {
-            job: Background::new("import", wake),
-            asked: None,
-            checked: None,
-        }
-    }
-
-    /// Checks this plan, unless that is done or under way; `None` if there is nothing to check.
-    pub(super) fn follow(&mut self, plan: Option<Arc<Plan>>, seed: Seed) {
-        let wanted = plan.map(|plan| (plan, seed));
-        let is_same = match (&wanted, &self.asked) {
-            (None, None) => true,
-            (Some((plan, seed)), Some((asked, before))) => seed == before && Arc::ptr_eq(plan, asked),
-            _ => false,
-        };
-        if !is_same {
-            self.asked.clone_from(&wanted);
-            self.checked = None;
-            match wanted {
-                None => self.job.abandon(),
-                Some((plan, seed)) => self.job.start(
-                    move |report| check(&plan, seed, report),
-                    |checked: Result<_, JobError>| checked.unwrap_or_else(|error| Err(error.to_string())),
-                ),
-            }
-        }
-        if let Some(checked) = self.job.next_event() {
-            self.checked = Some(checked);
-        }
-    }
-
-    /// Returns true while an import is being checked.
-    pub(super) fn is_under_way(&self) -> bool {
-        self.asked.is_some() && self.checked.is_none()
-    }
-}
-
-fn check(plan: &Plan, seed: Seed, report: &Report<Result<Checked, String>>) -> Result<Checked, String> {
-    let mut watch = |_| {
-        if report.is_cancelled() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    };
-    let imported = plan.recordings(Path::new(""), &mut watch);
+/// Imports the samples of a plan and divides them; `seed` is the seed of the run.
+///
+/// # Errors
+/// If that is not possible; the message says what to do.
+pub(super) fn check(plan: &Plan, seed: Seed, watch: Watch<'_>) -> Result<Checked, String> {
+    let imported = plan.recordings(Path::new(""), watch);
     let (recording, test_recording) = imported.map_err(|error| in_window(&error))?;
     let divided = plan.divide(&recording, test_recording.as_ref(), seed);
     let (split, test) = divided.map_err(|error| in_window(&error))?;

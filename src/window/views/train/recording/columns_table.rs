@@ -71,7 +71,10 @@ impl RecordingEditor {
         match changed.take() {
             None => return,
             Some(Change::Meaning(file, columns, meaning)) => import.set_meanings(file, columns, meaning),
-            Some(Change::Variable(file, name, meaning)) => self.take_variable(file, name, meaning),
+            Some(Change::Variable(file, name, meaning)) => {
+                import.wanted = Some((file, name, meaning));
+                self.read_again();
+            }
             Some(Change::Unit(file, column, unit)) => import.set_unit(file, column, &unit),
         }
         ui.request_repaint();

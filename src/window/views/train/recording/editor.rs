@@ -8,11 +8,10 @@ use std::{
 };
 
 use super::{
-    checking::Checking,
     files_section::FILES,
     import::{Import, file_name},
-    opening::{Files, Opened, Opening, Reopened, ToOpen},
-    options::Typed,
+    opening::{Opened, Reopened, open_files, reopen, write_sample},
+    reading::Reading,
 };
 use crate::window::{
     job::Wake,
@@ -25,7 +24,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::RunSummary,
-    import::{Meaning, Plan, Setup},
+    import::{Meaning, Plan, Setup, Watch},
 };
 
 /// Editor of the recording that is trained on: its files, the meaning of their columns, and the division of the samples.
@@ -39,16 +38,13 @@ pub struct RecordingEditor {
     pub(super) missing: Option<Box<Reopened>>,
     /// Names of files that have changed since the run with this import.
     pub(super) changed: Vec<String>,
-    pub(super) opening: Opening,
-    pub(super) checking: Checking,
-    /// Texts in the fields of options that are not in the plan yet, by the names of the options.
-    pub(super) typed: BTreeMap<&'static str, Typed>,
+    pub(super) reading: Reading,
+    /// Texts in the fields of options that are not in the plan, by the names of the options, with the reason if they were refused.
+    pub(super) typed: BTreeMap<&'static str, (String, Option<String>)>,
     /// True if the user is viewing the columns while there is a run to show.
     pub(super) shows_columns: bool,
     /// The file asked for last, and where its path arrives.
     asked: Option<(Use, Receiver<PathBuf>)>,
-    /// File and name of a variable whose rows become the samples, and the meaning of its columns.
-    variable: Option<(usize, String, Meaning)>,
     /// A checkpoint that the worker could not resume.
     refused: Option<PathBuf>,
     /// The run that the window knew last.
@@ -77,12 +73,10 @@ impl RecordingEditor {
             import: None,
             missing: None,
             changed: Vec::new(),
-            opening: Opening::new(Arc::clone(wake)),
-            checking: Checking::new(Arc::clone(wake)),
+            reading: Reading::new(Arc::clone(wake)),
             typed: BTreeMap::new(),
             shows_columns: false,
             asked: None,
-            variable: None,
             refused: None,
             run: None,
             held_out: None,
@@ -111,8 +105,8 @@ impl RecordingEditor {
         if let (Some(reopened), [path]) = (&self.missing, &paths[..]) {
             let mut missing = reopened.missing.iter();
             if let Some(missing) = missing.find(|missing| missing.file_name() == path.file_name()) {
-                let found = Some((missing.clone(), path.clone()));
-                return self.opening.start(ToOpen::Plan(reopened.clone(), found));
+                let (reopened, missing) = (reopened.clone(), missing.clone());
+                return self.take_found(*reopened, missing, path.clone());
             }
         }
         let open = self.import.as_ref().map(Import::paths).unwrap_or_default();
@@ -125,33 +119,33 @@ impl RecordingEditor {
         let is_open = self.plan().is_ok_and(|open| *open == *plan);
         let missing = self.missing.as_ref().map(|missing| &missing.recorded.plan);
         if !is_open && missing != Some(plan) {
-            let reopened = Box::new(Reopened::from(plan.clone()));
-            self.opening.start(ToOpen::Plan(reopened, None));
-        } else if self.opening.is_reopening {
-            self.opening.cancel();
+            let (reopened, name) = (Reopened::from(plan.clone()), file_name(&plan.import.data));
+            self.reading.open(name, true, |watch| reopen(reopened, watch));
+        } else if self.reading.is_reopening() {
+            self.reading.cancel();
         }
     }
 
     /// Checks the recordings of the checkpoint at `path`, which could not be resumed: they may be missing.
     pub fn look_for_recordings(&mut self, path: PathBuf) {
-        self.refused = Some(path.clone());
+        self.refused = Some(absolute(&path));
         self.open(vec![path]);
     }
 
     /// Returns true if no file is open, missing or being opened.
     pub fn is_empty(&self) -> bool {
-        self.import.is_none() && self.missing.is_none() && self.opening.under_way.is_none()
+        self.import.is_none() && self.missing.is_none() && !self.reading.is_opening()
     }
 
     /// Closes a recording; without the last one there is no import.
     pub(super) fn close(&mut self, number: usize) {
         let Some(import) = &mut self.import else { return };
-        let plan = import.edit();
-        if number == 0 && !plan.import.append.is_empty() {
+        if number == 0 && !import.plan.import.append.is_empty() {
             // The next one takes its place, with the files joined to it.
-            let next = plan.import.append.remove(0);
-            plan.import.data = next.data;
-            for (joined, file) in plan.import.join.iter_mut().zip(next.join) {
+            let recipe = &mut import.edit().import;
+            let next = recipe.append.remove(0);
+            recipe.data = next.data;
+            for (joined, file) in recipe.join.iter_mut().zip(next.join) {
                 joined.file = file;
             }
             return self.read_again();
@@ -167,7 +161,7 @@ impl RecordingEditor {
 
     /// Closes all files.
     pub(super) fn close_all(&mut self) {
-        self.opening.cancel();
+        self.reading.cancel();
         (self.import, self.missing) = (None, None);
         self.changed.clear();
         self.typed.clear();
@@ -180,28 +174,37 @@ impl RecordingEditor {
         }
     }
 
-    /// Makes the rows of a variable the samples, and gives its columns this meaning.
-    pub(super) fn take_variable(&mut self, file: usize, name: String, meaning: Meaning) {
-        self.variable = Some((file, name, meaning));
-        self.read_again();
+    fn open_files(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
+        let older = self.import.clone().unwrap_or_default();
+        let names = if new.is_empty() { &open } else { &new };
+        let names = Vec::from_iter(names.iter().map(|path| file_name(path))).join(", ");
+        self.reading
+            .open(names, false, move |watch| open_files(new, open, &older, watch));
     }
 
-    fn open_files(&mut self, new: Vec<PathBuf>, open: Vec<PathBuf>) {
-        let older = Box::new(self.import.clone().unwrap_or_default());
-        let used = older.used(self.variable.as_ref().map(|(file, name, _)| (*file, name.as_str())));
-        self.opening.start(ToOpen::Files(Files {
-            new,
-            open,
-            older,
-            used,
-            sample: None,
-        }));
+    /// Opens the sample recording, which is written into `folder`.
+    pub(super) fn open_sample(&mut self, folder: PathBuf) {
+        let open = move |watch: Watch<'_>| {
+            let new = vec![write_sample(&folder)?];
+            open_files(new, Vec::new(), &Import::default(), watch)
+        };
+        self.reading.open("sample recording".to_owned(), false, open);
+    }
+
+    /// Opens the file at `found` in the place of a missing one.
+    fn take_found(&mut self, mut reopened: Reopened, missing: PathBuf, found: PathBuf) {
+        let name = file_name(&found);
+        let open = move |watch: Watch<'_>| {
+            reopened.relocate(&missing, &found);
+            reopen(reopened, watch)
+        };
+        self.reading.open(name, true, open);
     }
 
     /// Takes events of the threads and paths chosen, and reports the plan if it has changed.
     pub fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.take_chosen(shared.phase.is_busy(), effects);
-        if let Some(opened) = self.opening.next_opened() {
+        if let Some(opened) = self.reading.next_opened() {
             match opened {
                 Ok(opened) => {
                     effects.push(Effect::Settle(Matter::Recording));
@@ -209,7 +212,6 @@ impl RecordingEditor {
                 }
                 Err(reason) => effects.push(failed(reason)),
             }
-            self.variable = None;
         }
         let run = shared.run.as_ref().map(|run| run.id);
         if run != self.run {
@@ -223,14 +225,14 @@ impl RecordingEditor {
             if plan.is_ok() {
                 self.follow_row_wires(settings, effects);
             }
-            self.checking.follow(plan.clone().ok(), settings.seed);
+            self.reading.check(plan.clone().ok(), settings.seed);
         }
         let is_reported = match (&plan, &shared.recording.plan) {
             (Ok(plan), Ok(reported)) => Arc::ptr_eq(plan, reported),
             (Err(reason), Err(reported)) => reason == reported,
             _ => false,
         };
-        if !self.opening.is_reopening && !is_reported {
+        if !self.reading.is_reopening() && !is_reported {
             effects.push(Effect::Import(plan));
         }
     }
@@ -244,8 +246,8 @@ impl RecordingEditor {
         match (of.clone(), &mut self.import, &self.missing) {
             (Use::Recording, ..) => self.open(paths),
             (Use::Missing(missing), _, Some(reopened)) => {
-                self.opening
-                    .start(ToOpen::Plan(reopened.clone(), Some((missing, path))));
+                let reopened = Reopened::clone(reopened);
+                self.take_found(reopened, missing, path);
             }
             (Use::Test, Some(import), _) => {
                 let refused = paths.into_iter().filter_map(|path| import.add_test_file(path).err());
@@ -266,7 +268,6 @@ impl RecordingEditor {
             Opened::Recordings(import) => {
                 let import = import.keeping(self.import.take().unwrap_or_default());
                 (self.import, self.missing) = (holding_out(import), None);
-                self.settle_variable();
                 self.show_columns(effects);
             }
             Opened::Plan(import, reopened) => {
@@ -322,20 +323,6 @@ impl RecordingEditor {
         }
     }
 
-    /// Gives the columns of the variable that the user chose their meaning.
-    fn settle_variable(&mut self) {
-        let (Some((file, name, meaning)), Some(import)) = (self.variable.take(), &mut self.import) else {
-            return;
-        };
-        let mut variables = import.files.get(file).into_iter().flat_map(|file| &file.variables);
-        if let Some(columns) = variables
-            .find(|variable| variable.name == name)
-            .map(|found| found.columns.clone())
-        {
-            import.set_meanings(file, columns, meaning);
-        }
-    }
-
     /// Shows the columns of files that the user has opened.
     fn show_columns(&mut self, effects: &mut Vec<Effect>) {
         self.changed.clear();
@@ -346,7 +333,7 @@ impl RecordingEditor {
     /// Sets the share held out for validation when another method needs another share, unless the user has set it.
     fn follow_method(&mut self, settings: &RunSettings) {
         let fraction = settings.validation_fraction();
-        let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.opening.is_reopening;
+        let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.reading.is_reopening();
         if let (true, Some(import)) = (is_new, &mut self.import) {
             import.edit().division.validation_fraction = Some(fraction);
         }
@@ -355,7 +342,7 @@ impl RecordingEditor {
 
     /// Selects one network for all rows if no column contains the row numbers.
     fn follow_row_wires(&self, settings: &RunSettings, effects: &mut Vec<Effect>) {
-        if settings.source.row_model() == RowModel::Each && !self.has_row_wires() && !self.opening.is_reopening {
+        if settings.source.row_model() == RowModel::Each && !self.has_row_wires() && !self.reading.is_reopening() {
             effects.push(Effect::ConfigureRecording(Box::new(RunSettings {
                 source: Source::Measured { rows: RowModel::Shared },
                 ..*settings
@@ -373,7 +360,7 @@ impl RecordingEditor {
         }
         match (&self.import, self.obstacle()) {
             (None, _) => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
-            (Some(_), _) if self.opening.under_way.is_some() => Err("Files are being opened.".to_owned()),
+            (Some(_), _) if self.reading.is_opening() => Err("Files are being opened.".to_owned()),
             (Some(_), Some(obstacle)) => Err(obstacle),
             (Some(import), None) => Ok(Arc::clone(&import.plan)),
         }
@@ -381,7 +368,7 @@ impl RecordingEditor {
 
     /// Returns the reason why there is nothing to train on yet: a text that was refused, or what the plan lacks.
     pub(super) fn obstacle(&self) -> Option<String> {
-        let refused = self.typed.values().find_map(|typed| typed.refusal.clone());
+        let refused = self.typed.values().find_map(|(_, refusal)| refusal.clone());
         refused.or_else(|| self.import.as_ref()?.obstacle())
     }
 
@@ -394,7 +381,7 @@ impl RecordingEditor {
 
     /// Returns the size of a training with one network, once the import is checked.
     pub fn training_size(&self, settings: &RunSettings) -> Option<TrainingSize> {
-        let checked = self.checking.checked.as_ref()?.as_ref().ok()?;
+        let checked = self.reading.checked()?;
         (settings.source.row_model() == RowModel::Shared).then_some(checked.size)
     }
 

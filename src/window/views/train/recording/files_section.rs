@@ -9,7 +9,7 @@ use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
 use super::{
     editor::{RecordingEditor, Use},
     import::{Import, file_name},
-    opening::{Files, ToOpen},
+    reading::State,
 };
 use crate::window::{
     shared::{Effect, FileTask, FileWords, Shared, file_stem, sentence},
@@ -36,32 +36,23 @@ pub(super) const FILES: FileWords = FileWords {
     ],
 };
 
-/// An open file by its use.
-enum OpenFile {
-    /// A recording by its number: the first, or one that is joined to it.
-    Recording(usize),
-    /// A file whose rows follow those of the first, by its number.
-    Appended(usize),
-    /// A file for the test, by the number of the recording that it replaces.
-    Test(usize),
-    /// Positions of targets.
-    Positions,
-}
+/// Closes an open file by its number among the files of the same use.
+type Close = fn(&mut RecordingEditor, usize);
 
 impl RecordingEditor {
     /// Shows the files of the recording, and opens and closes them.
     pub fn files_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         section_heading_ui(ui, "Files");
         self.missing_ui(ui, effects);
-        if let Some(file) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
-            self.close_file(file);
+        if let Some((close, number)) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
+            close(self, number);
         }
         for name in &self.changed {
             note_ui(ui, &format!("{name} has changed since the run was saved."));
         }
         self.samples_line_ui(ui);
-        if let Some((name, progress)) = &self.opening.under_way {
-            dim_ui(ui, &format!("Reading {name}…"));
+        if let State::Opening { names, progress, .. } = &self.reading.state {
+            dim_ui(ui, &format!("Reading {names}…"));
             let share = progress.and_then(|progress| Some(progress.bytes as f32 / progress.of?.max(1) as f32));
             if let Some(share) = share {
                 progress_bar_ui(ui, "Reading", share, &format!("{:.0} %", 100.0 * share));
@@ -75,10 +66,7 @@ impl RecordingEditor {
             if button.on_hover_text(hint).clicked() {
                 let data_folder = shared.runs.path.as_ref().and_then(|runs| runs.parent());
                 let folder = data_folder.map_or_else(std::env::temp_dir, PathBuf::from);
-                self.opening.start(ToOpen::Files(Files {
-                    sample: Some(folder.join("samples")),
-                    ..Files::default()
-                }));
+                self.open_sample(folder.join("samples"));
             }
         }
     }
@@ -102,39 +90,23 @@ impl RecordingEditor {
         }
     }
 
-    fn close_file(&mut self, file: OpenFile) {
-        match (file, &mut self.import) {
-            (OpenFile::Recording(number), _) => self.close(number),
-            (OpenFile::Appended(number), Some(import)) => import.close_appended(number),
-            (OpenFile::Test(number), Some(import)) => import.set_test_file(number, PathBuf::new()),
-            (OpenFile::Positions, Some(import)) => import.edit().import.positions = None,
-            (_, None) => {}
-        }
-    }
-
     /// Shows the numbers of channels and samples, or the error of the import.
     fn samples_line_ui(&self, ui: &mut Ui) {
         if self.import.is_none() {
             return;
         }
-        if let Some(reason) = self.obstacle() {
-            note_ui(ui, &sentence(&reason));
-            return;
-        }
-        let channels = self.channels().map(|(inputs, targets)| {
-            let inputs = counted(inputs, "input");
-            format!("{inputs}, {}", counted(targets, "target"))
-        });
-        let samples = match &self.checking.checked {
-            Some(Ok(checked)) => counted(checked.samples.iter().sum::<usize>(), "sample"),
-            Some(Err(reason)) => {
-                note_ui(ui, &sentence(reason));
-                return;
+        let (inputs, targets) = self.channels().unwrap_or_default();
+        let channels = format!("{}, {}", counted(inputs, "input"), counted(targets, "target"));
+        match (self.obstacle(), &self.reading.state) {
+            (Some(reason), _) => drop(note_ui(ui, &sentence(&reason))),
+            (None, State::Checked(Err(reason))) => drop(note_ui(ui, &sentence(reason))),
+            (None, State::Checked(Ok(checked))) => {
+                let samples = counted(checked.samples.iter().sum::<usize>(), "sample");
+                dim_ui(ui, &format!("{channels}, {samples}"));
             }
-            None if self.checking.is_under_way() => "checking the import…".to_owned(),
-            None => return,
-        };
-        dim_ui(ui, &format!("{}, {samples}", channels.unwrap_or_default()));
+            (None, State::Checking) => drop(dim_ui(ui, &format!("{channels}, checking the import…"))),
+            (None, _) => {}
+        }
     }
 
     fn buttons_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
@@ -147,9 +119,9 @@ impl RecordingEditor {
             if ui.add(ghost_button(text)).on_hover_text(FILES.description).clicked() {
                 effects.push(Effect::ChooseFile(self.open_task()));
             }
-            if self.opening.under_way.is_some() {
+            if self.reading.is_opening() {
                 if ui.add(ghost_button("Cancel")).clicked() {
-                    self.opening.cancel();
+                    self.reading.cancel();
                 }
             } else if !self.is_empty() {
                 let clear = ui.add(ghost_button("Clear"));
@@ -160,52 +132,60 @@ impl RecordingEditor {
         });
     }
 
-    /// Shows the button that displays the columns in place of the results.
+    /// Shows the button that displays the columns in place of the results, or the results again.
     pub fn columns_button_ui(&mut self, ui: &mut Ui, shared: &Shared) {
-        if self.import.is_some() && !self.is_on_show(shared) {
-            let button = ui.add(ghost_button("Columns…"));
-            let hint = "Shows the columns of the files and their meanings in place of the results.";
-            if button.on_hover_text(hint).clicked() {
-                self.shows_columns = true;
-                ui.request_repaint();
-            }
+        let is_on_show = self.is_on_show(shared);
+        if self.import.is_none() || (is_on_show && shared.shown_run().is_none()) {
+            return;
+        }
+        let text = if is_on_show { "Show results" } else { "Columns…" };
+        let hint = "Shows the columns of the files and their meanings in place of the results, or the results again.";
+        if ui.add(ghost_button(text)).on_hover_text(hint).clicked() {
+            self.shows_columns = !is_on_show;
+            ui.request_repaint();
         }
     }
 }
 
 /// Lists the open files. Returns the one to be closed.
-fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<OpenFile> {
+fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<(Close, usize)> {
     let recipe = &import.plan.import;
-    let recordings = import.paths().into_iter().enumerate().map(|(number, path)| {
+    let mut files: Vec<(Close, usize, PathBuf, String)> = Vec::new();
+    for (number, path) in import.paths().into_iter().enumerate() {
         let what = if number == 0 { "" } else { ", joined" };
-        (OpenFile::Recording(number), path, what.to_owned())
-    });
-    let appended = recipe.append.iter().enumerate();
-    let appended =
-        appended.map(|(number, set)| (OpenFile::Appended(number), set.data.clone(), ", appended".to_owned()));
-    let tests = import.tests().into_iter().enumerate();
-    let tests = tests
-        .filter(|(_, (_, test))| !test.as_os_str().is_empty())
-        .map(|(number, (recording, test))| {
-            let of = format!(", for the test of {}", file_name(&recording));
-            let what = if import.files.len() > 1 {
-                of
-            } else {
-                ", for the test".to_owned()
-            };
-            (OpenFile::Test(number), test, what)
-        });
-    let positions = recipe.positions.iter();
-    let positions = positions.map(|path| (OpenFile::Positions, path.clone(), ", positions".to_owned()));
+        files.push((RecordingEditor::close, number, path, what.to_owned()));
+    }
+    for (number, set) in recipe.append.iter().enumerate() {
+        let close: Close = |editor, number| {
+            editor
+                .import
+                .iter_mut()
+                .for_each(|import| import.close_appended(number))
+        };
+        files.push((close, number, set.data.clone(), ", appended".to_owned()));
+    }
+    for (number, (recording, test)) in import.tests().into_iter().enumerate() {
+        let of = format!(" of {}", file_name(&recording));
+        let what = format!(", for the test{}", if import.files.len() > 1 { &of } else { "" });
+        let close: Close = |editor, _| editor.import.iter_mut().for_each(|import| import.edit().test = None);
+        files.push((close, number, test, what));
+    }
+    if let Some(path) = &recipe.positions {
+        let close: Close = |editor, _| {
+            let import = editor.import.iter_mut();
+            import.for_each(|import| import.edit().import.positions = None);
+        };
+        files.push((close, 0, path.clone(), ", positions".to_owned()));
+    }
     let mut closed = None;
-    for (file, path, what) in recordings.chain(appended).chain(tests).chain(positions) {
+    for (close_file, number, path, what) in files {
         let name = file_name(&path);
         ui.horizontal(|ui| {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let close = ui.small_button("×");
                 close.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Close {name}")));
                 if close.on_hover_text("Closes this file.").clicked() {
-                    closed = Some(file);
+                    closed = Some((close_file, number));
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     let text = format!("{name}{what}");

@@ -25,6 +25,8 @@ pub(super) struct Import {
     chosen: BTreeMap<ColumnKey, Meaning>,
     /// Units, likewise.
     units: BTreeMap<ColumnKey, String>,
+    /// File and name of a variable whose rows are to be the samples, and the meaning that its columns get.
+    pub(super) wanted: Option<(usize, String, Meaning)>,
 }
 
 impl Import {
@@ -88,10 +90,10 @@ impl Import {
         let columns = self.files.iter().flat_map(|file| names(file, |_| true));
         columns.for_each(|name| drop(import.units.remove(&name)));
         let paths = Vec::from_iter(paths_and_stems(&import).map(|(path, _)| path.to_owned()));
-        let test = self.plan.test.as_ref().map(|test| self.matching(test, &paths));
+        let test = self.plan.test.as_ref().and_then(|test| self.matching(test, &paths));
         Plan {
             import,
-            test: found.test.or(test).filter(is_given),
+            test: found.test.or(test),
             division: self.plan.division,
         }
     }
@@ -112,15 +114,22 @@ impl Import {
             }
         }
         self.write_meanings(older.plan.import.has_groups());
+        if let Some((file, name, meaning)) = older.wanted
+            && let mut variables = self.files.get(file).into_iter().flat_map(|file| &file.variables)
+            && let Some(variable) = variables.find(|variable| variable.name == name)
+        {
+            let columns = variable.columns.clone();
+            self.set_meanings(file, columns, meaning);
+        }
         self
     }
 
-    /// Full names of the columns in use; in the file with a `variable` whose rows are to be the samples, only that.
-    pub(super) fn used(&self, variable: Option<(usize, &str)>) -> Vec<String> {
-        let of_file = |(number, file): (usize, &InspectedFile)| match variable {
-            Some((of_file, name)) if of_file == number => {
-                let stem = file.stem.iter().map(String::as_str);
-                vec![Vec::from_iter(stem.chain([name])).join(".")]
+    /// Full names of the columns in use; in the file with a variable that is wanted, only that.
+    pub(super) fn used(&self) -> Vec<String> {
+        let of_file = |(number, file): (usize, &InspectedFile)| match &self.wanted {
+            Some((of_file, name, _)) if *of_file == number => {
+                let stem = file.stem.iter().chain([name]);
+                vec![Vec::from_iter(stem.map(String::as_str)).join(".")]
             }
             _ => names(file, |meaning| meaning != Meaning::Unused),
         };
@@ -136,19 +145,19 @@ impl Import {
         text.collect()
     }
 
-    /// Returns the files of `set`, which correspond to those of this import, for the recordings at `paths`; an empty path
-    /// where there is none.
-    pub(super) fn matching(&self, set: &FileSet, paths: &[PathBuf]) -> FileSet {
+    /// Returns the files of `set`, which correspond to those of this import, for the recordings at `paths`, up to the first that
+    /// has none.
+    pub(super) fn matching(&self, set: &FileSet, paths: &[PathBuf]) -> Option<FileSet> {
         let own = self.paths();
-        let mut files = paths.iter().map(|path| {
+        let mut files = paths.iter().map_while(|path| {
             let found = own.iter().zip(set.files()).find(|(other, _)| *other == path);
-            found.map_or_else(PathBuf::new, |(_, file)| file.clone())
+            found.map(|(_, file)| file.clone())
         });
-        FileSet {
-            data: files.next().unwrap_or_default(),
+        Some(FileSet {
+            data: files.next()?,
             join: files.collect(),
             append: set.append.clone(),
-        }
+        })
     }
 
     /// The plan, to be edited.
@@ -245,8 +254,7 @@ impl Import {
             .collect()
     }
 
-    /// Returns the files for the test, each with the recording that it replaces; the path of a file that is still to be given
-    /// is empty.
+    /// Returns the files for the test that are given, each with the recording that it replaces.
     pub(super) fn tests(&self) -> Vec<(PathBuf, PathBuf)> {
         let tests = self.plan.test.iter().flat_map(FileSet::files);
         self.paths().into_iter().zip(tests.cloned()).collect()
@@ -257,41 +265,26 @@ impl Import {
     /// # Errors
     /// If it cannot be one; the message says what to do.
     pub(super) fn add_test_file(&mut self, path: PathBuf) -> Result<(), String> {
-        let (name, recordings, tests) = (file_name(&path), self.paths(), self.tests());
-        let lacking = tests.iter().position(|(_, test)| is_empty(test));
-        let number = match (lacking, recordings.len()) {
-            (Some(number), _) => number,
-            (None, count) if tests.is_empty() || count == 1 => 0,
-            (None, count) => {
-                return Err(format!(
-                    "{name} was not opened: each of the {count} recordings already has a file for the test. To use others, \
-                     close those files first."
-                ));
+        let (name, recordings, given) = (file_name(&path), self.paths(), self.tests().len());
+        match (&mut self.edit().test, recordings.len()) {
+            (Some(_), count) if count > 1 && given == count => Err(format!(
+                "{name} was not opened: each of the {count} recordings already has a file for the test. To use others, close \
+                 those files first."
+            )),
+            (Some(test), count) if count > 1 => {
+                test.join.push(path);
+                Ok(())
             }
-        };
-        // The same file may be joined to both: its times distinguish its rows.
-        if number == 0 && recordings[0] == path {
-            return Err(format!(
+            // The same file may be joined to both: its times distinguish its rows.
+            _ if recordings[0] == path => Err(format!(
                 "{name} is trained on, so it cannot be a test file: choose a separate recording for the test."
-            ));
+            )),
+            (test, _) => {
+                let set = test.insert(FileSet::default());
+                set.data = path;
+                Ok(())
+            }
         }
-        self.set_test_file(number, path);
-        Ok(())
-    }
-
-    /// Sets the file that replaces this recording for the test; with an empty path, closes it.
-    pub(super) fn set_test_file(&mut self, number: usize, path: PathBuf) {
-        let joined = self.plan.import.join.len();
-        let mut test = self.edit().test.take().unwrap_or_default();
-        if is_empty(&path) {
-            test.append.clear();
-        }
-        test.join.resize(joined, PathBuf::new());
-        match number.checked_sub(1) {
-            None => test.data = path,
-            Some(joined) => test.join[joined] = path,
-        }
-        self.edit().test = Some(test).filter(is_given);
     }
 
     /// Closes one of the files whose rows follow those of the first, with the files joined to it.
@@ -302,7 +295,9 @@ impl Import {
 
     /// Returns the reason why there is nothing to train on yet, with what to do.
     pub(super) fn obstacle(&self) -> Option<String> {
-        if let Some((recording, _)) = self.tests().iter().find(|(_, test)| is_empty(test)) {
+        if self.plan.test.is_some()
+            && let Some(recording) = self.paths().get(self.tests().len())
+        {
             return Some(format!(
                 "{} has no file for the test yet: choose it with “Test file…” under “Samples”, or close the other files of \
                  the test.",
@@ -336,15 +331,6 @@ fn paths_and_stems(recipe: &Recipe) -> impl Iterator<Item = (&Path, Option<Strin
     let joined = recipe.join.iter().zip(recipe.stems());
     let joined = joined.map(|(joined, stem)| (joined.file.as_path(), Some(stem)));
     once((recipe.data.as_path(), None)).chain(joined)
-}
-
-fn is_empty(path: &Path) -> bool {
-    path.as_os_str().is_empty()
-}
-
-/// Returns `true` if a set has any file.
-fn is_given(set: &FileSet) -> bool {
-    !set.files().all(|path| is_empty(path))
 }
 
 /// Returns the name of a file without its folder.

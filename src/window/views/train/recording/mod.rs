@@ -1,7 +1,7 @@
 //! Recordings as the source of a training: their files, the meaning of their columns, and the division of their samples.
 //!
-//! [`editor`] edits the plan of an [`import`]. [`opening`] inspects files in the background, and [`checking`] reads the samples
-//! whenever the plan has changed. [`files_section`] and [`options`] are parts of the form, [`columns_table`] and
+//! [`editor`] edits the plan of an [`import`]. In the background, [`reading`] inspects files ([`opening`]) and, whenever the plan
+//! has changed, its samples ([`checking`]). [`files_section`] and [`options`] are parts of the form, [`columns_table`] and
 //! [`samples_card`] the middle of the view.
 
 mod checking;
@@ -11,6 +11,7 @@ mod files_section;
 mod import;
 mod opening;
 mod options;
+mod reading;
 mod samples_card;
 
 pub use editor::RecordingEditor;

@@ -11,8 +11,8 @@ use decoupler_core::dataset::Simulation;
 use decoupler_files::{
     export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, atomic_write},
     import::{
-        FileChecksum, FileSet, Format, Joined, Plan, Progress, Recorded, Watch, file_crc32, holds_positions,
-        suggested_plan, suggested_plan_in_order,
+        FileChecksum, FileSet, Format, Joined, Plan, Recorded, Watch, file_crc32, holds_positions, suggested_plan,
+        suggested_plan_in_order,
     },
 };
 
@@ -20,31 +20,6 @@ use super::{
     checking::in_window,
     import::{Import, file_name},
 };
-use crate::window::job::{Background, JobError, Report, Wake};
-
-/// Files to be opened.
-#[derive(Debug)]
-pub(super) enum ToOpen {
-    /// Recordings, or a file of this program.
-    Files(Files),
-    /// Files of a plan, of which the missing one at the first path was found at the second.
-    Plan(Box<Reopened>, Option<(PathBuf, PathBuf)>),
-}
-
-/// Recordings to be opened.
-#[derive(Debug, Default)]
-pub(super) struct Files {
-    /// Files to be opened: one may be a recipe, a network or a checkpoint.
-    pub(super) new: Vec<PathBuf>,
-    /// Folder into which the sample recording is written, to be opened too.
-    pub(super) sample: Option<PathBuf>,
-    /// Files that are open, to which recordings are added.
-    pub(super) open: Vec<PathBuf>,
-    /// The import with them.
-    pub(super) older: Box<Import>,
-    /// Full names of columns and variables whose rows are the samples.
-    pub(super) used: Vec<String>,
-}
 
 /// Contents of a file that was opened.
 #[derive(Debug)]
@@ -63,93 +38,27 @@ pub(super) enum Opened {
     Checkpoint(PathBuf),
 }
 
-/// Event of files being opened.
-#[derive(Debug)]
-enum OpeningEvent {
-    Reading(Progress),
-    Opened(Result<Opened, String>),
-}
-
-/// Files under way.
-#[derive(Debug)]
-pub(super) struct Opening {
-    job: Background<OpeningEvent>,
-    /// Names of the files under way, and the progress of reading them.
-    pub(super) under_way: Option<(String, Option<Progress>)>,
-    /// True while the files of a plan are being opened.
-    pub(super) is_reopening: bool,
-}
-
-impl Opening {
-    pub(super) fn new(wake: Wake) -> Self {
-        Self {
-            job: Background::prompt("opening", wake),
-            under_way: None,
-            is_reopening: false,
+/// Opens the files at `new`, of which one may be a recipe, a network or a checkpoint. Recordings are added to those at `open`,
+/// which are those of the `older` import.
+pub(super) fn open_files(
+    new: Vec<PathBuf>,
+    open: Vec<PathBuf>,
+    older: &Import,
+    watch: Watch<'_>,
+) -> Result<Opened, String> {
+    let of_folder = |path: PathBuf| {
+        if !path.is_dir() {
+            return Ok(vec![path]);
         }
-    }
-
-    /// Opens files; those still being opened are abandoned.
-    pub(super) fn start(&mut self, to_open: ToOpen) {
-        let paths = match &to_open {
-            ToOpen::Files(files) if files.new.is_empty() => &files.open[..],
-            ToOpen::Files(files) => &files.new,
-            ToOpen::Plan(reopened, _) => std::slice::from_ref(&reopened.recorded.plan.import.data),
-        };
-        let names = Vec::from_iter(paths.iter().map(|path| file_name(path))).join(", ");
-        self.is_reopening = matches!(to_open, ToOpen::Plan(..));
-        self.under_way = Some((names, None));
-        self.job.start(
-            move |report| open(to_open, report),
-            |opened: Result<_, JobError>| OpeningEvent::Opened(opened.unwrap_or_else(|error| Err(error.to_string()))),
-        );
-    }
-
-    /// Cancels opening files.
-    pub(super) fn cancel(&mut self) {
-        self.job.abandon();
-        (self.under_way, self.is_reopening) = (None, false);
-    }
-
-    /// Returns the contents of the files once they are read.
-    pub(super) fn next_opened(&mut self) -> Option<Result<Opened, String>> {
-        loop {
-            match (self.job.next_event()?, &mut self.under_way) {
-                (OpeningEvent::Reading(progress), Some((_, latest))) => *latest = Some(progress),
-                (OpeningEvent::Reading(_), None) => {}
-                (OpeningEvent::Opened(opened), _) => {
-                    (self.under_way, self.is_reopening) = (None, false);
-                    return Some(opened);
-                }
-            }
-        }
-    }
-}
-
-fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String> {
-    let mut watch = |progress| {
-        report.progress(OpeningEvent::Reading(progress), |_, _| ());
-        if report.is_cancelled() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        let found = Format::tables_in(&path).map_err(|error| format!("cannot read '{}': {error}", path.display()))?;
+        let refusal = || format!("'{}' is a folder without tables: open a file", path.display());
+        Some(found).filter(|found| !found.is_empty()).ok_or_else(refusal)
     };
-    match to_open {
-        ToOpen::Files(files) => open_files(files, &mut watch),
-        ToOpen::Plan(mut reopened, found) => {
-            if let Some((missing, found)) = found {
-                reopened.relocate(&missing, &found)?;
-            }
-            reopen(*reopened, &mut watch)
-        }
-    }
-}
-
-fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
-    let older = files.older;
-    let mut new = with_tables_of_folders(files.new)?;
-    new.extend(files.sample.map(|folder| write_sample(&folder)).transpose()?);
+    let new = new
+        .into_iter()
+        .map(of_folder)
+        .collect::<Result<Vec<_>, String>>()?
+        .concat();
     let document = new.iter().find_map(|path| Some((path, DocumentKind::of_file(path)?)));
     match (document, new.len()) {
         (None, _) => {}
@@ -158,15 +67,8 @@ fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
             return Err(format!("'{}' is a {kind}: open it without other files", path.display()));
         }
     }
-    let tests = older.tests();
-    if let Some(path) = new.iter().find(|path| tests.iter().any(|(_, test)| test == *path)) {
-        return Err(format!(
-            "'{}' is a file for the test, so it cannot be trained on: close it under “Files” first",
-            path.display()
-        ));
-    }
     let (positions, recordings): (Vec<PathBuf>, Vec<PathBuf>) = new.into_iter().partition(|path| holds_positions(path));
-    let has_recording = !(files.open.is_empty() && recordings.is_empty());
+    let has_recording = !(open.is_empty() && recordings.is_empty());
     if let Some(path) = positions.first().filter(|_| positions.len() > 1 || !has_recording) {
         let path = path.display();
         return Err(format!(
@@ -176,7 +78,7 @@ fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
     // The file with the readings is guessed only if the set of files changes.
     let has_new = !recordings.is_empty();
     let appended = &older.plan.import.append;
-    let mut paths = files.open;
+    let mut paths = open;
     let further = appended.iter().flat_map(FileSet::files).filter(|_| has_new);
     for path in further.chain(&recordings) {
         if !paths.contains(path) {
@@ -188,7 +90,7 @@ fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
     let mut inspect = |plan: &Plan| {
         let mut import = older.merged(plan.clone()).import;
         import.time = import.time.or_else(|| time.clone());
-        let inspected = import.inspect(Path::new(""), &files.used, watch);
+        let inspected = import.inspect(Path::new(""), &older.used(), watch);
         inspected.map_err(|error| in_window(&error))
     };
     let mut plan = Plan::default();
@@ -202,7 +104,7 @@ fn open_files(files: Files, watch: Watch<'_>) -> Result<Opened, String> {
         suggested_plan_in_order(&inspected)
     };
     if !has_new {
-        plan.import.append = appended.iter().map(|set| older.matching(set, &paths)).collect();
+        plan.import.append = appended.iter().filter_map(|set| older.matching(set, &paths)).collect();
     }
     plan.import.positions = positions.into_iter().next();
     let inspected = inspect(&plan)?;
@@ -214,24 +116,6 @@ fn joined(file: PathBuf) -> Joined {
         file,
         ..Joined::default()
     }
-}
-
-/// Replaces folders by the tables in them.
-fn with_tables_of_folders(paths: Vec<PathBuf>) -> Result<Vec<PathBuf>, String> {
-    let mut files = Vec::new();
-    for path in paths {
-        if path.is_dir() {
-            let found = Format::tables_in(&path);
-            let mut found = found.map_err(|error| format!("cannot read '{}': {error}", path.display()))?;
-            if found.is_empty() {
-                return Err(format!("'{}' is a folder without tables: open a file", path.display()));
-            }
-            files.append(&mut found);
-        } else {
-            files.push(path);
-        }
-    }
-    Ok(files)
 }
 
 fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Opened, String> {
@@ -270,7 +154,7 @@ fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Op
 }
 
 /// Opens the files of a plan again, if all are there, and notes which have changed.
-fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
+pub(super) fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
     let missing = reopened.recorded.missing();
     reopened.missing = missing.into_iter().map(PathBuf::from).collect();
     if !reopened.missing.is_empty() {
@@ -339,22 +223,10 @@ impl From<Plan> for Reopened {
 }
 
 impl Reopened {
-    /// Replaces a missing file by `found`, and other missing files by those of the same name and contents next to it.
-    ///
-    /// # Errors
-    /// If a file cannot be read.
-    fn relocate(&mut self, missing: &Path, found: &Path) -> Result<(), String> {
-        self.recorded = self.recorded.relocated(missing, found);
+    /// Replaces a missing file by `found`, and other missing files by those of the same name next to it.
+    pub(super) fn relocate(&mut self, missing: &Path, found: &Path) {
         let folder = found.parent().unwrap_or(Path::new(""));
-        for file in self.recorded.files.clone() {
-            let neighbour = file.path.file_name().map(|name| folder.join(name));
-            if let Some(neighbour) = neighbour.filter(|neighbour| !file.path.exists() && neighbour.is_file())
-                && has_checksum(&neighbour, &file.crc32)?
-            {
-                self.recorded = self.recorded.relocated(&file.path, &neighbour);
-            }
-        }
-        Ok(())
+        self.recorded = self.recorded.relocated(missing, found).within(folder);
     }
 }
 
@@ -375,7 +247,7 @@ const TEXT: &str = include_str!("../../../../../assets/samples/soft_skin.csv");
 ///
 /// # Errors
 /// If it cannot be written.
-fn write_sample(folder: &Path) -> Result<PathBuf, String> {
+pub(super) fn write_sample(folder: &Path) -> Result<PathBuf, String> {
     let path = folder.join(NAME);
     let written = fs::create_dir_all(folder).map_err(|error| error.to_string());
     let write = |()| atomic_write(&path, |file| file.write_all(TEXT.as_bytes())).map_err(|error| error.to_string());
@@ -415,14 +287,14 @@ mod tests {
         assert_eq!(reopened.missing, [gone("sensor.csv"), gone("states.csv")]);
 
         let mut found = reopened.clone();
-        found.relocate(&gone("sensor.csv"), &at("sensor.csv")).unwrap();
+        found.relocate(&gone("sensor.csv"), &at("sensor.csv"));
         let Opened::Plan(import, found) = open(&found) else {
             panic!("the other file is next to it");
         };
         assert_eq!(import.plan.import.join[0].file, at("states.csv"));
         assert!(found.changed.is_empty());
 
-        reopened.relocate(&gone("sensor.csv"), &at("other.csv")).unwrap();
+        reopened.relocate(&gone("sensor.csv"), &at("other.csv"));
         let Opened::Plan(_, reopened) = open(&reopened) else {
             panic!("the other file is found");
         };

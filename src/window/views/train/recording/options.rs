@@ -1,7 +1,7 @@
 //! The folded parts of the form of a recording. Each option of the import is a row of a table, with its name, its hint, and how
 //! its text is read from the plan and written into it; one form shows them all.
 
-use std::{fmt::Display, str::FromStr};
+use std::{fmt::Display, str::FromStr, sync::Arc};
 
 use decoupler_core::{
     dataset::{Memory, SplitBy},
@@ -233,71 +233,6 @@ fn named<T: Named>(text: &str) -> Result<Option<T>, String> {
     given(text).map(T::parse).transpose().map_err(|error| error.to_string())
 }
 
-/// Parts of the form below the samples.
-#[derive(Clone, Copy, PartialEq)]
-enum Part {
-    Filter,
-    Computed,
-    History,
-    Positions,
-    Joins,
-    Format,
-}
-
-/// Parts with their names, their summaries while no option is given, notes and options.
-const PARTS: [(Part, &str, &str, &str, &[ImportOption]); 6] = [
-    (Part::Filter, "Filter", "all", "", &FILTER),
-    (
-        Part::Computed,
-        "Computed columns",
-        "none",
-        "Columns computed from others of the same file, such as a difference, a ratio, or the change since the start. They are \
-         computed wherever the network decodes.",
-        &COMPUTED,
-    ),
-    (
-        Part::History,
-        "History of readings",
-        "none",
-        "Sensors with hysteresis, creep or drift: the inputs of the network also contain what the readings were before, \
-         within a group and across no gap in time.",
-        &HISTORY,
-    ),
-    (
-        Part::Positions,
-        "Positions",
-        "none",
-        "Targets that are deformations or forces at places of the skin, such as taxels: with their positions the actual \
-         and the decoded surface of each test sample are shown. The file has the header target,x,y, in millimetres.",
-        &[],
-    ),
-    (
-        Part::Joins,
-        "Joined files",
-        "row by row",
-        "Rows belong together by their number. To join by time, make a column of each file “time” in the table.",
-        &JOINS,
-    ),
-    (Part::Format, "File format", DETECTED, "", &FORMAT),
-];
-
-/// Returns the summary of a part, if it is not that of its options.
-fn summary(part: Part, plan: &Plan, shared: &Shared) -> Option<String> {
-    let (memory, is_automatic) = (&plan.import.memory, shared.recording.is_automatic());
-    let chosen = shared.chosen_run().and_then(|run| run.setup.plan());
-    match part {
-        Part::History => Some(match (memory, chosen) {
-            (None, None) if is_automatic => "automatic".to_owned(),
-            (None, Some(chosen)) => history(chosen).to_string(),
-            (Some(memory), _) if is_automatic => format!("{memory}, fixed"),
-            _ => history(plan).to_string(),
-        }),
-        Part::Positions => plan.import.positions.as_ref().map(|path| file_name(path)),
-        Part::Joins if plan.import.time.is_some() => Some("by time".to_owned()),
-        _ => None,
-    }
-}
-
 const POSITIONS: FileWords = FileWords {
     kind: "file of positions",
     description: "A table of text with the header target,x,y: the name of each target, and where it lies on the skin in \
@@ -310,66 +245,89 @@ const TEST_FILES: FileWords = FileWords {
     ..FILES
 };
 
-/// Text of an option that is being typed, or that was refused, with the reason.
-#[derive(Debug)]
-pub(super) struct Typed {
-    text: String,
-    pub(super) refusal: Option<String>,
-}
-
 impl RecordingEditor {
     /// Shows the folded parts of the import; changes the seed of `settings`.
     pub fn folds_ui(&mut self, ui: &mut Ui, settings: &mut RunSettings, shared: &Shared, effects: &mut Vec<Effect>) {
         let Some(import) = &self.import else { return };
+        let (plan, formats) = (Arc::clone(&import.plan), import.text_formats());
         fold_ui(ui, "Samples", &samples_summary(import, settings), |ui| {
             self.split_ui(ui, settings.validation_fraction());
-            let button = ui.add(ghost_button("Test file…"));
-            if button
-                .on_hover_text("A separate recording for the test, instead of a share.")
-                .clicked()
-            {
+            let button = ui.add(ghost_button("Test file…")).on_hover_text(TEST_FILES.description);
+            if button.clicked() {
                 effects.push(Effect::ChooseFile(self.ask(Use::Test, TEST_FILES, String::new())));
             }
             seed_ui(ui, "Seed", glossary::SEED.hint, &mut settings.seed.0, 0);
         });
-        for (part, name, usual, note, options) in PARTS {
-            let Some(import) = &self.import else { return };
-            let (plan, formats) = (&import.plan, import.text_formats());
-            let is_by_time = part == Part::Joins && plan.import.time.is_some();
-            match part {
-                Part::Joins if plan.import.join.is_empty() => continue,
-                Part::Format if formats.is_empty() => continue,
-                _ => {}
+        self.part_ui(ui, "Filter", "all", &[], &FILTER);
+        let notes = [
+            "Columns computed from others of the same file, such as a difference, a ratio, or the change since the start. \
+             They are computed wherever the network decodes.",
+        ];
+        self.part_ui(ui, "Computed columns", "none", &notes, &COMPUTED);
+        let is_automatic = shared.recording.is_automatic();
+        let chosen = shared.chosen_run().and_then(|run| run.setup.plan());
+        let chosen = chosen.map(|plan| history(plan).to_string());
+        let usual = chosen
+            .as_deref()
+            .unwrap_or(if is_automatic { "automatic" } else { "none" });
+        let notes = [
+            "Sensors with hysteresis, creep or drift: the inputs of the network also contain what the readings were before, \
+             within a group and across no gap in time.",
+            "Chosen automatically while these fields are empty; what is given here is kept.",
+        ];
+        self.part_ui(
+            ui,
+            "History of readings",
+            usual,
+            &notes[..1 + usize::from(is_automatic)],
+            &HISTORY,
+        );
+        let positions = plan.import.positions.as_ref().map(|path| file_name(path));
+        fold_ui(ui, "Positions", positions.as_deref().unwrap_or("none"), |ui| {
+            dim_ui(
+                ui,
+                "Targets that are deformations or forces at places of the skin, such as taxels: with their positions the \
+                 actual and the decoded surface of each test sample are shown. The file has the header target,x,y, in \
+                 millimetres.",
+            );
+            let button = ui
+                .add(ghost_button("Positions file…"))
+                .on_hover_text(POSITIONS.description);
+            if button.clicked() {
+                effects.push(Effect::ChooseFile(self.ask(Use::Positions, POSITIONS, String::new())));
             }
-            let texts = options.iter().map(|option| (option.get)(plan));
-            let texts = Vec::from_iter(texts.filter(|text| !text.is_empty())).join(", ");
-            let refusal = options
-                .iter()
-                .find_map(|option| self.typed.get(option.name)?.refusal.clone());
-            let summary = refusal
-                .or_else(|| summary(part, plan, shared))
-                .or(given(&texts).map(str::to_owned));
-            fold_ui(ui, name, summary.as_deref().unwrap_or(usual), |ui| {
-                let kept = "Chosen automatically while these fields are empty; what is given here is kept.";
-                let kept = Some(kept).filter(|_| part == Part::History && shared.recording.is_automatic());
-                let formats = formats.iter().map(String::as_str).filter(|_| part == Part::Format);
-                let note = given(note).filter(|_| !is_by_time);
-                for note in note.into_iter().chain(kept).chain(formats) {
-                    dim_ui(ui, note);
-                }
-                let has_options = part != Part::Joins || is_by_time;
-                for option in options.iter().filter(|_| has_options) {
-                    self.option_ui(ui, option);
-                }
-                if part == Part::Positions {
-                    let button = ui.add(ghost_button("Positions file…"));
-                    if button.on_hover_text(POSITIONS.description).clicked() {
-                        let task = self.ask(Use::Positions, POSITIONS, String::new());
-                        effects.push(Effect::ChooseFile(task));
-                    }
-                }
-            });
+        });
+        let by_number =
+            "Rows belong together by their number. To join by time, make a column of each file “time” in the table.";
+        match plan.import.time {
+            _ if plan.import.join.is_empty() => {}
+            Some(_) => self.part_ui(ui, "Joined files", "by time", &[], &JOINS),
+            None => self.part_ui(ui, "Joined files", "row by row", &[by_number], &[]),
         }
+        if !formats.is_empty() {
+            let notes = Vec::from_iter(formats.iter().map(String::as_str));
+            self.part_ui(ui, "File format", DETECTED, &notes, &FORMAT);
+        }
+    }
+
+    /// Shows a folded part with notes and the fields of its options; `usual` is the summary while no option is given.
+    fn part_ui(&mut self, ui: &mut Ui, name: &str, usual: &str, notes: &[&str], options: &[ImportOption]) {
+        let Some(import) = &self.import else { return };
+        let refusal = options.iter().find_map(|option| self.typed.get(option.name)?.1.clone());
+        let given = options.iter().filter_map(|option| {
+            let text = Some((option.get)(&import.plan)).filter(|text| !text.is_empty())?;
+            Some(format!("{} {text}", option.name.to_lowercase()))
+        });
+        let given = Vec::from_iter(given).join(", ");
+        let usual = if given.is_empty() { usual } else { &given };
+        fold_ui(ui, name, refusal.as_deref().unwrap_or(usual), |ui| {
+            for note in notes {
+                dim_ui(ui, note);
+            }
+            for option in options {
+                self.option_ui(ui, option);
+            }
+        });
     }
 
     /// Shows the field of an option, and writes what the user gives into the plan.
@@ -399,25 +357,21 @@ impl RecordingEditor {
         let ImportOption { name, hint, .. } = *option;
         let label = ui.label(name).on_hover_text(hint);
         let typed = self.typed.get(name);
-        let mut text = typed.map_or(shown, |typed| typed.text.clone());
-        let refusal = typed.and_then(|typed| typed.refusal.as_ref());
+        let (mut text, refusal) = typed.cloned().unwrap_or((shown, None));
+        // Also one that lost the focus while another view was displayed.
+        let is_untried = typed.is_some() && refusal.is_none();
         // Notes come and go above while it is being typed.
         let edit = TextEdit::singleline(&mut text).id(Id::unique(("recording", name)));
         let edit = ui.add(edit.desired_width(f32::INFINITY).hint_text(example));
         let edit = edit.labelled_by(label.id).on_hover_text(hint);
-        if let Some(reason) = refusal.filter(|_| !edit.has_focus()) {
-            note_ui(ui, reason);
-        }
-        // Also one that lost the focus while another view was displayed.
-        let is_due = typed.is_some() && refusal.is_none() && !edit.has_focus();
         if edit.changed() {
-            let typed = Typed {
-                text: text.clone(),
-                refusal: None,
-            };
-            self.typed.insert(name, typed);
+            self.typed.insert(name, (text.clone(), None));
         }
-        is_due.then_some(text)
+        match refusal {
+            Some(reason) if !edit.has_focus() => drop(note_ui(ui, &reason)),
+            _ => {}
+        }
+        (is_untried && !edit.has_focus()).then_some(text)
     }
 
     /// Writes the text of an option into the plan, and reads the files again if they are read in another way now.
@@ -426,23 +380,13 @@ impl RecordingEditor {
         let mut plan = Plan::clone(&import.plan);
         self.typed.remove(option.name);
         if let Err(reason) = (option.set)(&mut plan, &text) {
-            let refusal = Some(reason);
-            self.typed.insert(option.name, Typed { text, refusal });
-            return;
-        }
-        let reading = |plan: &Plan| {
-            (
-                plan.import.dialect,
-                plan.import.derive.clone(),
-                plan.import.missing.clone(),
-            )
-        };
-        let reads = reading(&plan) != reading(&import.plan);
-        if plan != *import.plan {
-            import.plan = plan.into();
-        }
-        if reads {
-            self.read_again();
+            self.typed.insert(option.name, (text, Some(reason)));
+        } else if plan != *import.plan {
+            let before = std::mem::replace(&mut import.plan, plan.into());
+            let (now, before) = (&import.plan.import, &before.import);
+            if (now.dialect, &now.derive, &now.missing) != (before.dialect, &before.derive, &before.missing) {
+                self.read_again();
+            }
         }
     }
 
@@ -484,7 +428,7 @@ impl RecordingEditor {
 fn samples_summary(import: &Import, settings: &RunSettings) -> String {
     let division = import.plan.division;
     let share = input_text((1000.0 * division.test_fraction).round() / 10.0);
-    let split = match import.tests().iter().find(|(_, test)| !test.as_os_str().is_empty()) {
+    let split = match import.tests().first() {
         Some((_, test)) => format!("test: {}", file_name(test)),
         None => format!("{}, {share} % test", division.by),
     };

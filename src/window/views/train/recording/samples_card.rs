@@ -1,12 +1,12 @@
 //! The middle of the Train view while a recording is imported: its columns, and the resulting samples.
 
-use eframe::egui::{Align, Layout, Sense, Ui};
+use eframe::egui::{Sense, Ui};
 
-use super::{checking::Checked, editor::RecordingEditor};
+use super::{checking::Checked, editor::RecordingEditor, reading::State};
 use crate::window::{
     shared::{Effect, Shared, sentence},
     theme::space,
-    widgets::{card_ui, dim_ui, ghost_button, invitation_ui, note_ui, scrolled_ui, section_heading_ui},
+    widgets::{card_ui, dim_ui, invitation_ui, note_ui, scrolled_ui, section_heading_ui},
 };
 
 const INVITATION: &str = "Readings of a sensor with the targets measured at the same time, such as forces: one file, several that \
@@ -30,17 +30,7 @@ impl RecordingEditor {
             let height = (SAMPLES.0 * whole.height()).clamp(SAMPLES.1, SAMPLES.2);
             let (columns, samples) = whole.split_top_bottom_at_y(whole.bottom() - height);
             card_ui(ui, columns.with_max_y(columns.bottom() - space(2)), |ui| {
-                ui.horizontal(|ui| {
-                    ui.vertical(|ui| section_heading_ui(ui, "Columns"));
-                    if shared.shown_run().is_some() {
-                        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                            if ui.add(ghost_button("Show results")).clicked() {
-                                self.shows_columns = false;
-                                ui.request_repaint();
-                            }
-                        });
-                    }
-                });
+                section_heading_ui(ui, "Columns");
                 self.columns_table_ui(ui, shared.phase.is_busy());
             });
             card_ui(ui, samples, |ui| scrolled_ui(ui, "samples", |ui| self.samples_ui(ui)));
@@ -50,15 +40,11 @@ impl RecordingEditor {
 
     fn samples_ui(&self, ui: &mut Ui) {
         section_heading_ui(ui, "Samples");
-        match &self.checking.checked {
-            Some(Ok(checked)) => checked_ui(ui, checked),
-            Some(Err(reason)) => {
-                dim_ui(ui, &format!("There are no samples: {}", sentence(reason)));
-            }
-            None if self.checking.is_under_way() => {
-                dim_ui(ui, "Checking the import…");
-            }
-            None => {}
+        match &self.reading.state {
+            State::Checked(Ok(checked)) => checked_ui(ui, checked),
+            State::Checked(Err(reason)) => drop(dim_ui(ui, &format!("There are no samples: {}", sentence(reason)))),
+            State::Checking => drop(dim_ui(ui, "Checking the import…")),
+            State::Idle | State::Opening { .. } | State::Opened(_) => {}
         }
     }
 }
