@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, time::Duration};
 
-use decoupler::window::{Notice, Phase};
+use decoupler::window::{Effect, Notice, Phase};
 use decoupler_core::{
     evaluation::{Run, RunSettings, Spread, StartRecord},
     job::Job,
@@ -30,6 +30,11 @@ fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
     }
     driver.type_into("File", &path.display().to_string());
     driver.click_button(if button == OPEN { "Open" } else { "Save" });
+}
+
+/// Opens a checkpoint without scrolling to the button, which would move the table and the times out of view.
+fn open(driver: &mut Driver, path: &Path) {
+    driver.window_mut().apply(Effect::OpenTraining(path.to_owned()));
 }
 
 fn save(driver: &mut Driver, button: &str, path: &Path) {
@@ -244,7 +249,7 @@ fn a_checkpoint_shows_the_wall_time_of_all_starts_or_none() {
         file.wall_time = saved.map(Duration::from_secs);
         file.save(&path).unwrap();
         let mut driver = Driver::open();
-        enter_path(&mut driver, OPEN, &path);
+        open(&mut driver, &path);
         driver.wait("the training", |driver| {
             let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());
             result.is_some_and(|result| result.wall_time == file.wall_time)
@@ -278,7 +283,7 @@ fn an_invalid_or_damaged_checkpoint_is_explained_and_changes_nothing() {
     ];
     for (reason, contents) in cases {
         fs::write(&path, &contents).unwrap();
-        enter_path(&mut driver, OPEN, &path);
+        open(&mut driver, &path);
         driver.wait("the reason", |driver| driver.notice().is_some());
         let expected = CheckpointFile::load(&path).unwrap_err().to_string();
         assert!(expected.contains(reason), "{expected}");
@@ -291,7 +296,7 @@ fn an_invalid_or_damaged_checkpoint_is_explained_and_changes_nothing() {
         driver.click("Dismiss");
     }
     fs::write(&path, &intact).unwrap();
-    enter_path(&mut driver, OPEN, &path);
+    open(&mut driver, &path);
     driver.wait("the intact one", |driver| driver.state().phase == Phase::Paused);
 }
 

@@ -8,7 +8,7 @@ use crate::window::{
     job::JobError,
     preview::PreviewEvent,
     shared::{Matter, Notice, Phase, Preview, RunView, RunsRequest, ViewKind},
-    training_worker::{Began, Event, Start},
+    training_worker::{Event, Start},
 };
 use decoupler_core::evaluation::RunSettings;
 
@@ -90,14 +90,14 @@ impl DecouplerWindow {
     }
 
     /// Shows a training that has begun. If one from a checkpoint has ended, its next event says so.
-    fn take_begun(&mut self, began: Began, start: Start) {
+    fn take_begun(&mut self, began: RunView, start: Start) {
         let setup = began.setup.clone();
         self.shared.preview = None;
         self.previews.abandon();
         self.shared.run = Some(RunView {
             // The checkpoint of one that was cut short is removed when the window closes.
             is_saved: start == Start::Paused,
-            ..RunView::new(began)
+            ..began
         });
         if start != Start::New {
             self.take_setup(&setup);

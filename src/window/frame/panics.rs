@@ -74,13 +74,6 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     driver.save("Error table, CSV", &table);
     assert!(table.exists());
 
-    panics(&mut driver, "path", |driver| {
-        driver.export("Error table, CSV");
-        driver.type_into("File", &table.display().to_string());
-        driver.click_button("Save");
-    });
-    driver.press(Key::Escape);
-
     panics(&mut driver, "past network", |driver| {
         driver.get("Epoch of the displayed network").focus();
         driver.harness().run_steps(2);

@@ -12,7 +12,7 @@ mod state;
 mod training_form;
 mod view;
 
-pub use super::training_worker::RunResult;
+pub use super::training_worker::{RunResult, RunView};
 pub use command::{About, Command, Offer, Offers};
 pub use error_table::error_table_ui;
 pub use export::{
@@ -22,7 +22,7 @@ pub use export::{
 pub use look::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 pub use offers::{FileInUse, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
-pub use run_view::{RunView, run_buttons_ui, sentence, training_status};
+pub use run_view::{run_buttons_ui, sentence, training_status};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
 pub use training_form::{Effect, Matter, Notice};
 pub use view::{Columns, Holdings, MIN_WIDTH_FOR_REPORT, Status, Tone, Unfinished, View, ViewKind};

@@ -10,13 +10,9 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{
-        Baselines, Coverage, Run, RunError, RunSettings, StartRecord, TestErrors,
-        auto::{AutoProgress, AutoRecord},
-    },
+    evaluation::{Coverage, Run, RunError, RunSettings, StartRecord, TestErrors, auto::AutoProgress},
     live::{DriftReference, LiveError},
     network::Networks,
-    problem::Problem,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
 use decoupler_files::{
@@ -25,10 +21,13 @@ use decoupler_files::{
 };
 use ndarray::Array2;
 
-use super::{calibration::Calibration, keeping::Keeping, past_networks::PastNetworks, training_loop::TrainingLoop};
+use super::{
+    calibration::Calibration, keeping::Keeping, past_networks::PastNetworks, run_view::RunView,
+    training_loop::TrainingLoop,
+};
 use crate::window::{
     job::{Background, JobError, Wake},
-    test_view::{TargetCharts, TestSet},
+    test_view::TargetCharts,
 };
 
 /// Request from the window to the worker.
@@ -83,7 +82,7 @@ pub enum Start {
 #[derive(Debug)]
 pub enum Event {
     /// A training has begun, or an error.
-    Began(RunId, Start, Result<Box<Began>, String>),
+    Began(RunId, Start, Result<Box<RunView>, String>),
     /// Question about a training that was cut short, if there is one.
     Left(Option<String>),
     /// The running training cannot be kept, with the reason.
@@ -129,27 +128,6 @@ impl RunId {
         static BEGUN: AtomicU64 = AtomicU64::new(1);
         Self(BEGUN.fetch_add(1, Ordering::Relaxed))
     }
-}
-
-/// Data known when a training begins.
-#[derive(Debug)]
-pub struct Began {
-    /// Its identity.
-    pub id: RunId,
-    /// Requested setup.
-    pub asked: Setup,
-    /// Setup of the training: as requested, or with the settings that were chosen.
-    pub setup: Setup,
-    /// What was tried to choose the settings, if they were chosen.
-    pub search: Option<AutoRecord>,
-    /// Description of the readings and targets.
-    pub problem: Arc<Problem>,
-    /// Number of weights and biases of the network.
-    pub weights: usize,
-    /// The test set.
-    pub test: TestSet,
-    /// Errors of the baselines.
-    pub baselines: Baselines,
 }
 
 /// State of a training.

@@ -10,7 +10,6 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::SplitBy,
     evaluation::{
         Intervals, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
@@ -25,13 +24,13 @@ use decoupler_files::{
         CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
         describe_worse_than_ridge,
     },
-    import::{ChoosingProgress, Plan, Progress as Reading, Setup, SetupSets},
+    import::{ChoosingProgress, Progress as Reading, Setup, SetupSets},
     machine::system_cause,
 };
 use ndarray::Array2;
 
 use super::{
-    Began, Event, Origin, Progress, Request, RunId, RunResult, Start, TrainedRun,
+    Event, Origin, Progress, Request, RunId, RunResult, RunView, Start, TrainedRun,
     calibration::Calibration,
     keeping::{Keeping, question},
     message::{Watched, continue_run, furthest_epoch},
@@ -205,7 +204,7 @@ impl<'a> TrainingLoop<'a> {
 
     /// Draws or reads the samples of a training, chooses its settings if they are to be chosen, and initialises or restores
     /// its networks.
-    fn prepare(&self, id: RunId, origin: Origin) -> Result<(TrainedRun, Began), String> {
+    fn prepare(&self, id: RunId, origin: Origin) -> Result<(TrainedRun, RunView), String> {
         let report = self.report;
         let is_cancelled = || self.watched.newest.load(Ordering::Relaxed) != id.0 || report.is_cancelled();
         let job = Job::new(&is_cancelled);
@@ -239,7 +238,8 @@ impl<'a> TrainingLoop<'a> {
                 restored(left.path(), &job, &mut on_reading)?
             }
         };
-        let began = began(id, &trained, asked).map_err(|error| error.to_string())?;
+        let began =
+            RunView::begun(id, &trained.run, trained.recorded.as_ref(), asked).map_err(|error| error.to_string())?;
         job.check().map_err(|error| error.to_string())?;
         Ok((trained, began))
     }
@@ -460,27 +460,6 @@ fn restored(path: &Path, job: &Job<'_>, on_reading: &mut dyn FnMut(Reading)) -> 
     let resumed = file.resume(job, on_reading);
     let (run, sets) = resumed.map_err(|error| format!("'{}': {error}", path.display()))?;
     Ok(TrainedRun::new(run, &sets))
-}
-
-/// Returns what the window needs to know of a training that begins; `asked` is its setup before the settings were chosen.
-fn began(id: RunId, trained: &TrainedRun, asked: Option<Setup>) -> Result<Began, TestViewError> {
-    let run = &trained.run;
-    let plan = trained.recorded.as_ref().map(|recorded| recorded.plan.clone());
-    let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
-    let setup = Setup::of(*run.settings(), plan).expect("a recorded run has its plan");
-    Ok(Began {
-        id,
-        asked: asked.unwrap_or_else(|| setup.clone()),
-        setup,
-        search: trained.recorded.as_ref().and_then(|recorded| recorded.search.clone()),
-        problem: Arc::clone(run.problem()),
-        weights: run.leader().weights(),
-        test: TestSet::of(run, order)?,
-        baselines: run
-            .baselines()
-            .cloned()
-            .expect("the baselines of a whole run are measured"),
-    })
 }
 
 impl TrainedRun {

@@ -92,15 +92,8 @@ impl Drawn {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::window::{
-        shared::RunView,
-        test_view::TestSet,
-        training_worker::{Began, RunId},
-    };
-    use decoupler_core::{
-        dataset::SplitBy,
-        evaluation::{Run, RunSettings},
-    };
+    use crate::window::{shared::RunView, training_worker::RunId};
+    use decoupler_core::evaluation::{Run, RunSettings};
 
     fn result(run: &Run) -> RunResult {
         let decoupled_mm = run.decouple_test();
@@ -135,16 +128,7 @@ mod tests {
         ) = (20, 8);
         let mut run = Run::prepare(settings).unwrap();
         let mut shared = Shared::new(true);
-        shared.run = Some(RunView::new(Began {
-            id: RunId::new(),
-            asked: settings.into(),
-            setup: settings.into(),
-            search: None,
-            problem: Arc::clone(run.problem()),
-            weights: 0,
-            test: TestSet::of(&run, SplitBy::Time).unwrap(),
-            baselines: run.baselines().unwrap().clone(),
-        }));
+        shared.run = Some(RunView::begun(RunId::new(), &run, None, None).unwrap());
         let mut drawn = Drawn::default();
         drawn.follow(&shared, shared.result(), 0, 0);
         assert!(drawn.pairs().is_none() && drawn.surfaces.as_ref().unwrap().decoded.is_none());
