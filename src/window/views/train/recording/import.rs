@@ -266,25 +266,27 @@ impl Import {
     /// If it cannot be one; the message says what to do.
     pub(super) fn add_test_file(&mut self, path: PathBuf) -> Result<(), String> {
         let (name, recordings, given) = (file_name(&path), self.paths(), self.tests().len());
-        match (&mut self.edit().test, recordings.len()) {
-            (Some(_), count) if count > 1 && given == count => Err(format!(
+        let count = recordings.len();
+        if count > 1 && given == count {
+            return Err(format!(
                 "{name} was not opened: each of the {count} recordings already has a file for the test. To use others, close \
                  those files first."
-            )),
-            (Some(test), count) if count > 1 => {
-                test.join.push(path);
-                Ok(())
-            }
-            // The same file may be joined to both: its times distinguish its rows.
-            _ if recordings[0] == path => Err(format!(
-                "{name} is trained on, so it cannot be a test file: choose a separate recording for the test."
-            )),
-            (test, _) => {
-                let set = test.insert(FileSet::default());
-                set.data = path;
-                Ok(())
-            }
+            ));
         }
+        // The same file may be joined to both: its times distinguish its rows.
+        let is_first = given == 0 || count == 1;
+        if is_first && recordings[0] == path {
+            return Err(format!(
+                "{name} is trained on, so it cannot be a test file: choose a separate recording for the test."
+            ));
+        }
+        let test = self.edit().test.get_or_insert_default();
+        if is_first {
+            test.data = path;
+        } else {
+            test.join.push(path);
+        }
+        Ok(())
     }
 
     /// Closes one of the files whose rows follow those of the first, with the files joined to it.
