@@ -502,6 +502,7 @@ impl Driver {
                 _ => None,
             });
             if copied.is_some() {
+                self.harness.run_steps(2);
                 return copied;
             }
             std::thread::sleep(Duration::from_millis(5));

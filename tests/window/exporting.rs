@@ -275,9 +275,8 @@ fn the_menu_says_in_each_view_why_nothing_can_be_exported_yet() {
     let mut driver = Driver::open();
     for (view, line, reason) in [
         ("Train", "Report…", "Nothing is trained yet: press Train first."),
-        ("Experiments", "Data…", "No trial has finished yet: press Run first."),
+        ("Study", "Data…", "Nothing has finished yet: press Run first."),
         ("Compare", "Network…", "No run is chosen as A: choose one in the list."),
-        ("Trade-off", "Data…", "No point is measured yet: press Measure first."),
     ] {
         driver.click_button(view);
         driver.settle();

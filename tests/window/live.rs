@@ -52,7 +52,7 @@ fn start(driver: &mut Driver) {
 }
 
 /// The number at the beginning of what a text says after `name`; 0 if there is no such text.
-fn number(driver: &Driver, name: &str) -> f64 {
+pub(crate) fn number(driver: &Driver, name: &str) -> f64 {
     let texts = driver.texts();
     let number = texts
         .iter()

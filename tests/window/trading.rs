@@ -278,7 +278,8 @@ fn a_measurement_waits_while_a_training_would_distort_its_times() {
     driver.harness().run_steps(20);
     assert!(!driver.has("Decoding: Ridge, paper preset"), "nothing is measured");
     driver.click_button("Train");
-    driver.act("Stop training");
+    driver.click("■ Stop");
+    driver.settle();
     driver.click_button("Study");
     wait_for_the_end(&mut driver);
     assert!(!driver.says("would distort the times"));

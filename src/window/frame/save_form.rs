@@ -83,10 +83,11 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     let edit = ui.add(edit.desired_width(f32::INFINITY)).labelled_by(label.id);
     let has_entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     // Typing and Enter are enough; Tab still reaches the buttons.
-    if ui.memory(|memory| memory.focused().is_none()) {
+    let is_new = std::mem::take(&mut saving.is_new);
+    if is_new || ui.memory(|memory| memory.focused().is_none()) {
         edit.request_focus();
     }
-    if std::mem::take(&mut saving.is_new) {
+    if is_new {
         // Typing replaces the whole path.
         let mut state = TextEditState::load(ui.ctx(), id).unwrap_or_default();
         let whole = CCursorRange::two(CCursor::new(0), CCursor::new(saving.path.chars().count()));

@@ -1,11 +1,11 @@
 //! The middle of the Train view while a recording is imported: its columns, and the resulting samples.
 
-use eframe::egui::{Sense, Ui};
+use eframe::egui::{RichText, Sense, Ui};
 
 use super::{checking::Checked, editor::RecordingEditor, reading::State};
 use crate::window::{
     shared::{Effect, Shared, sentence},
-    theme::space,
+    theme::{semibold, space, type_size},
     widgets::{card_ui, dim_ui, invitation_ui, note_ui, scrolled_ui, section_heading_ui},
 };
 
@@ -21,7 +21,7 @@ impl RecordingEditor {
         let whole = ui.available_rect_before_wrap();
         if self.import.is_none() {
             card_ui(ui, whole, |ui| {
-                section_heading_ui(ui, "Drop recordings here");
+                ui.label(RichText::new("Drop recordings here").font(semibold(type_size().title)));
                 if invitation_ui(ui, INVITATION, "Open files…", true) {
                     effects.push(Effect::ChooseFile(self.open_task()));
                 }
