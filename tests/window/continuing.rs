@@ -255,7 +255,7 @@ fn a_checkpoint_shows_the_wall_time_of_all_starts_or_none() {
             result.is_some_and(|result| result.wall_time == file.wall_time)
         });
         let texts = driver.texts();
-        for (name, value) in [("Training, all starts", all), ("Time per epoch", an_epoch)] {
+        for (name, value) in [("Training, all restarts", all), ("Time per epoch", an_epoch)] {
             let place = texts.iter().rposition(|text| text == name).unwrap();
             assert_eq!(texts[place + 1], value, "{texts:#?}");
         }

@@ -314,7 +314,7 @@ pub(in crate::window) mod planned_panic {
 
     use std::cell::Cell;
 
-    use super::Report;
+    use crate::window::job::Report;
 
     /// Message of the panics.
     pub(in crate::window) const MESSAGE: &str = "a planned panic";

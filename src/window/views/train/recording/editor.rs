@@ -45,8 +45,8 @@ pub struct RecordingEditor {
     pub(super) shows_columns: bool,
     /// The file asked for last, and where its path arrives.
     asked: Option<(Use, Receiver<PathBuf>)>,
-    /// A checkpoint that the worker could not resume.
-    refused: Option<PathBuf>,
+    /// True while the recordings of a checkpoint are looked for that the worker could not resume.
+    is_refused: bool,
     /// The run that the window knew last.
     run: Option<RunId>,
     /// Share held out for validation that the method needs; `None` if the share of a plan is to be kept.
@@ -77,7 +77,7 @@ impl RecordingEditor {
             typed: BTreeMap::new(),
             shows_columns: false,
             asked: None,
-            refused: None,
+            is_refused: false,
             run: None,
             held_out: None,
         }
@@ -101,6 +101,7 @@ impl RecordingEditor {
 
     /// Opens files: recordings are added to those that are open; a recipe, a network or a checkpoint takes their place.
     pub fn open(&mut self, paths: Vec<PathBuf>) {
+        self.is_refused = false;
         let paths = Vec::from_iter(paths.iter().map(|path| absolute(path)));
         if let (Some(reopened), [path]) = (&self.missing, &paths[..]) {
             let mut missing = reopened.missing.iter();
@@ -128,8 +129,8 @@ impl RecordingEditor {
 
     /// Checks the recordings of the checkpoint at `path`, which could not be resumed: they may be missing.
     pub fn look_for_recordings(&mut self, path: PathBuf) {
-        self.refused = Some(absolute(&path));
         self.open(vec![path]);
+        self.is_refused = true;
     }
 
     /// Returns true if no file is open, missing or being opened.
@@ -205,7 +206,11 @@ impl RecordingEditor {
     pub fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.take_chosen(shared.phase.is_busy(), effects);
         if let Some(opened) = self.reading.next_opened() {
+            let is_refused = std::mem::take(&mut self.is_refused);
             match opened {
+                // The window has said why it was refused.
+                Err(_) if is_refused => {}
+                Ok(opened) if is_refused && !matches!(opened, Opened::Missing(_)) => {}
                 Ok(opened) => {
                     effects.push(Effect::Settle(Matter::Recording));
                     self.take(opened, shared, effects);
@@ -315,11 +320,7 @@ impl RecordingEditor {
                 effects.push(Effect::Notify(Matter::Recording, Notice::Done(text)));
                 effects.extend((!is_listed).then(|| Effect::KeepRun(file)));
             }
-            Opened::Checkpoint(path) => {
-                if self.refused.take().as_ref() != Some(&path) {
-                    effects.push(Effect::OpenTraining(path));
-                }
-            }
+            Opened::Checkpoint(path) => effects.push(Effect::OpenTraining(path)),
         }
     }
 
