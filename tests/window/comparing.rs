@@ -68,7 +68,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     // The last two, the older one first.
     wait_for_both(&mut driver);
     driver.enter("Name of run 1", "Six hidden nodes");
-    assert!(driver.has("Six hidden nodes as A"), "{:#?}", driver.texts());
+    driver.wait("the new name", |driver| driver.has("Six hidden nodes as A"));
 
     let settings = [6, 4].map(|hidden| RunSettings { hidden, ..small() });
     let runs = settings.map(trained);
@@ -139,7 +139,7 @@ fn a_run_is_removed_only_when_that_is_confirmed() {
     assert_eq!(kept(&driver), 2);
     driver.click(&format!("Remove {FIRST}"));
     driver.click_button("Remove");
-    assert_eq!(kept(&driver), 1);
+    driver.wait("the removal", |driver| kept(driver) == 1);
     assert!(driver.state().runs.pinned(0).is_none());
     drop(driver);
     let mut driver = Driver::open_keeping(&path);

@@ -163,7 +163,7 @@ fn a_paused_training_is_idle_and_resumes_as_if_it_had_never_been_paused() {
     driver.wait("the end", |driver| {
         driver.state().phase == Phase::Ended(StopReason::Stopped)
     });
-    assert!(driver.says("stopped by you"));
+    assert!(driver.says("Stopped at epoch"));
     let mut run = Run::prepare(endless()).unwrap();
     for _ in 0..driver.epochs() {
         run.step();
@@ -184,7 +184,7 @@ fn keys_pause_resume_and_stop_and_the_next_training_starts_again() {
     assert_eq!(driver.state().phase, Phase::Training);
     driver.press_with(Modifiers::COMMAND, Key::P);
     driver.press_with(Modifiers::COMMAND, Key::Period);
-    driver.wait("the end", |driver| driver.says("stopped by you"));
+    driver.wait("the end", |driver| driver.says("Stopped at epoch"));
 
     choose_method(&mut driver, "Levenberg-Marquardt");
     driver.enter("Epochs", "15");
@@ -209,7 +209,7 @@ fn stopping_a_training_being_prepared_takes_effect_at_once_and_the_previous_one_
         driver.window_mut().apply(Effect::Configure(Box::new(small())));
         driver.train();
         assert_eq!(driver.table(), table_of(&trained(small())));
-        assert!(!driver.says("stopped by you"));
+        assert!(!driver.says("Stopped at epoch"));
     }
 }
 

