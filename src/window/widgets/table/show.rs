@@ -39,7 +39,9 @@ impl TableView<'_> {
     /// Shows a table of `rows` rows that fills the available space and scrolls if it is larger; `row` creates the visible
     /// rows.
     pub fn show<'r>(self, ui: &mut Ui, rows: usize, row: impl Fn(usize) -> TableRow<'r>) -> Option<TableClick> {
-        let measured = Vec::from_iter((0..rows.min(MEASURED_ROWS)).map(&row));
+        let has_measured = self.columns.iter().any(|column| column.width == ColumnWidth::Content);
+        let measured = if has_measured { rows.min(MEASURED_ROWS) } else { 0 };
+        let measured = Vec::from_iter((0..measured).map(&row));
         let lines = Lines::new(&self, ui, ui.available_width() - SCROLL_BAR, true, &measured);
         lines.show(ui, rows, &mut |place| row(place))
     }
