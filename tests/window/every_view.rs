@@ -94,7 +94,7 @@ fn every_view_is_named_described_and_whole() {
             driver.settle();
         }
     }
-    assert!(faults.is_empty(), "{:#?}", faults);
+    assert!(faults.is_empty(), "{faults:#?}");
 }
 
 fn name_of(source: SourceKind) -> &'static str {

@@ -157,10 +157,9 @@ fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<(Close, usize)> {
     }
     for (number, set) in recipe.append.iter().enumerate() {
         let close: Close = |editor, number| {
-            editor
-                .import
-                .iter_mut()
-                .for_each(|import| import.close_appended(number))
+            if let Some(import) = &mut editor.import {
+                import.close_appended(number);
+            }
         };
         files.push((close, number, set.data.clone(), ", appended".to_owned()));
     }
