@@ -8,7 +8,7 @@ use std::{
 };
 
 /// The modules of `src/window`; each uses only those before it.
-const ORDER: [&str; 12] = [
+const ORDER: [&str; 13] = [
     "theme",
     "glossary",
     "widgets",
@@ -19,6 +19,7 @@ const ORDER: [&str; 12] = [
     "preview",
     "training_worker",
     "shared",
+    "forms",
     "views",
     "frame",
 ];

@@ -35,7 +35,7 @@ CANCEL = (200, 422)
 def show_experiments(folder):
     os.makedirs(f"{folder}/decoupler")
     with open(f"{folder}/decoupler/window.json", "w") as file:
-        json.dump({"has_toured": True, "view": "Experiments"}, file)
+        json.dump({"has_toured": True, "view": "Study"}, file)
 
 
 def measure(window):

@@ -210,7 +210,7 @@ fn main() {
             shown.is_some() && shown == settings.simulation().map(|simulation| simulation.sensor.scale)
         });
         let points = bench.state().test().map_or([0, 0], |test| {
-            let grid = test.surface.grid();
+            let grid = test.map.grid();
             [grid.x_mm().len(), grid.y_mm().len()]
         });
         let name = |what: &str| format!("{scale}, surfaces of {}×{}: {what}", points[0], points[1]);

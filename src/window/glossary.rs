@@ -134,12 +134,12 @@ terms! { NETWORK_TERMS:
         "Principal components, each divided by its standard deviation: components of small variance count as much as \
          large ones, unless noise hides them.",
         "component / √(σ² + noise²)";
-    STARTS = "Starts",
+    STARTS = "Restarts",
         "Number of trainings from different random weights, side by side. Several starts show how much the results vary.";
     AUTO = "Automatic settings",
         "Memory, scaling, hidden nodes, method and epochs are chosen by cross-validation on the training samples, in about a \
          minute; the answer is the best combination of ridge, kernel ridge and networks. Turned off, the form begins with the settings that were chosen.";
-    COMBINE = "Combine starts",
+    COMBINE = "Combine restarts",
         "Keep the start with the lowest validation error, or average the answers of all starts: their mean is one network \
          with the hidden nodes of all, and varies less than any of them.";
     SEED = "Seed",
@@ -216,6 +216,22 @@ terms! { SENSOR_TERMS:
     CONDITION_NUMBER = "Condition number",
         "Worst-case amplification of a relative error in the readings, for the worst row with its nodes pressed halfway.",
         "largest / smallest singular value of the Jacobian of ln R";
+    UNKNOWNS = "Unknowns of a row",
+        "Number of coordinates to decode from the readings of one row-wire.";
+    READINGS = "Readings of a row",
+        "Number of resistances measured for one row-wire, one for each column-wire.";
+    WORST_ROW = "Worst row",
+        "The row-wire with the smallest singular value.";
+    SIMILAR_ROWS = "Most similar rows",
+        "The two row-wires with the most similar readings at rest, and their relative difference.";
+    NOISE = "Noise of a reading",
+        "Relative standard deviation of one reading, from all noise sources of the scene.";
+    PATTERNS = "Deformation patterns above the noise",
+        "Number of deformation patterns of the worst row that the readings determine better than the scene alone does.";
+    UNCERTAINTY = "Uncertainty of the worst pattern",
+        "Standard deviation of the worst-seen deformation pattern, in mm, from the readings alone.";
+    REMAINING = "Remaining spread",
+        "Spread of the deformation after a reading, in percent of its spread before (root mean square over patterns).";
     SINGULAR_VALUES = "Singular values",
         "How strongly each independent pattern of movement of a row changes its readings, per millimetre. Patterns with \
          small ones drown in the noise.",

@@ -11,9 +11,11 @@
 //! | `test_view`, `preview` | test set ready to be drawn; preview of settings before a training |
 //! | `training_worker` | the thread that trains |
 //! | `shared` | state shared by all views: settings, current training, run list, appearance; and the requests of views |
+//! | `forms` | fields of sensor, scene, network and training, for every view and both sources |
 //! | `views` | one module per view, independent of each other |
 //! | `frame` | layout of the views, and handling of their requests |
 
+mod forms;
 mod frame;
 mod glossary;
 mod job;
@@ -29,6 +31,4 @@ mod widgets;
 
 pub use frame::{DecouplerWindow, Desktop, OpenError, WindowFile, open};
 pub use shared::{Effect, Matter, Notice, Phase, Shared, SourceKind};
-pub use views::{
-    Analysis, BottomTab, DecoderResult, PlannedLevel, PlannedRun, Question, Touch, TradeOffEnding, TradeOffPlan, Views,
-};
+pub use views::{DecoderResult, Views};

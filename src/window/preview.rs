@@ -15,30 +15,20 @@ use decoupler_files::machine::memory_budget;
 pub enum PreviewEvent {
     /// Test set of these settings.
     Drawn(Box<RunSettings>, Result<TestView, TestViewError>),
-    /// Baselines of these settings; `None` if they take long or cannot be computed, which a training would explain.
-    Compared(Box<RunSettings>, Option<Baselines>),
-    /// The thread ended without a result.
-    Failed(JobError),
+    /// Baselines, the last event; `None` if they take long or cannot be computed, which a training would explain.
+    Compared(Result<Option<Baselines>, JobError>),
 }
 
-/// Draws the test set of these settings; replaces an earlier request.
-pub fn draw(job: &mut Background<PreviewEvent>, settings: RunSettings) {
-    job.start(
-        move |_| PreviewEvent::Drawn(Box::new(settings), TestView::draw(&settings)),
-        |drawn| drawn.unwrap_or_else(PreviewEvent::Failed),
-    );
-}
-
-/// Computes the baselines of these settings; replaces an earlier request.
-pub fn compare(job: &mut Background<PreviewEvent>, settings: RunSettings) {
+/// Draws the test set of these settings unless that `is_known`, and computes the baselines; replaces an earlier request.
+pub fn request(job: &mut Background<PreviewEvent>, settings: RunSettings, is_known: bool) {
     job.start(
         move |report| {
-            PreviewEvent::Compared(
-                Box::new(settings),
-                baselines(&settings, &Job::new(&|| report.is_cancelled())),
-            )
+            if !is_known {
+                report.send(PreviewEvent::Drawn(Box::new(settings), TestView::draw(&settings)));
+            }
+            baselines(&settings, &Job::new(&|| report.is_cancelled()))
         },
-        |compared| compared.unwrap_or_else(PreviewEvent::Failed),
+        PreviewEvent::Compared,
     );
 }
 

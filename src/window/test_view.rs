@@ -1,6 +1,6 @@
 //! Test set of a simulated array or of a recording, ready to be drawn.
 
-use std::{ops::RangeInclusive, sync::Arc};
+use std::sync::Arc;
 
 use decoupler_core::{
     dataset::{Dataset, Simulation, SplitBy},
@@ -11,8 +11,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     figure::{
-        HeatMap, RegressionLine, SequentialMap, TargetSurface, position_error_map,
-        surface::{Quantity, Surface, ViewMode},
+        HeatMap, RegressionLine, TargetSurface, position_error_map,
+        surface::{Quantity, Surface},
     },
     import::SetupError,
 };
@@ -70,6 +70,15 @@ impl TestSet {
         }
     }
 
+    /// Returns what is drawn of `snapshot`, or of the last one if there are fewer; `answers` are the outputs of a network for
+    /// the samples. `None` where no surface goes through the targets.
+    pub fn drawing(&self, answers: Option<&Array2<f64>>, snapshot: usize) -> Option<Drawing> {
+        match self {
+            Self::Array(test) => Some(test.drawing(answers, snapshot)),
+            Self::Recording(test) => test.drawing(answers, snapshot),
+        }
+    }
+
     /// Returns the number of test snapshots: whole frames of an array, or samples of a recording.
     pub fn snapshots(&self) -> usize {
         match self {
@@ -77,24 +86,6 @@ impl TestSet {
             Self::Recording(test) => test.set.samples(),
         }
     }
-
-    /// Returns the description of the channels of a recording; `None` for a simulated array.
-    pub fn problem(&self) -> Option<&Problem> {
-        self.recording().map(|test| &*test.problem)
-    }
-}
-
-/// Appearance of the surfaces of a test set.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SurfaceStyle {
-    /// Perspective view or top view.
-    pub mode: ViewMode,
-    /// Colour map of heights.
-    pub colours: SequentialMap,
-    /// Range of heights shown by colours and axes.
-    pub heights: HeightScale,
-    /// Range of the error colours in millimetres, if locked; else that of the displayed errors.
-    pub error_limit_mm: Option<f64>,
 }
 
 /// Range of heights shown by colours and axes.
@@ -115,7 +106,7 @@ pub struct TestView {
     /// Samples of each snapshot, from the first row to the last.
     pub snapshots: Arc<Vec<Vec<usize>>>,
     /// Interpolation from the heights of nodes to those of the drawn grid.
-    pub surface: Arc<SurfaceMap>,
+    pub map: Arc<SurfaceMap>,
     /// Sensor of the samples.
     pub sensor: SensorModel,
     /// Row-wires that are read and drawn, from 0.
@@ -153,18 +144,12 @@ impl TestView {
             unloaded_ohm: unloaded_ohm(&sensor, &rows).map(Arc::new),
             snapshots: Arc::new(set.snapshots()),
             set,
-            surface: SurfaceMap::shared(&x_mm, &y_mm)?,
+            map: SurfaceMap::shared(&x_mm, &y_mm)?,
             sensor,
             rows,
             stroke_mm,
             outlook: outlook(simulation),
         })
-    }
-
-    /// Returns the range of the height scale: z from full compression to rest, in millimetres.
-    pub fn z_range_mm(&self) -> RangeInclusive<f64> {
-        let height_mm = self.sensor.geometry.height_mm;
-        height_mm - self.stroke_mm..=height_mm
     }
 
     /// Returns the index of a node among the drawn nodes, row by row.
@@ -173,25 +158,25 @@ impl TestView {
         Some(row_index * self.sensor.scale.nodes_per_row() + address.node)
     }
 
-    /// Returns the nearest existing snapshot.
-    pub fn nearest_snapshot(&self, snapshot: usize) -> usize {
-        snapshot.min(self.snapshots.len().saturating_sub(1))
-    }
-
-    /// Returns the nodes of a snapshot and the surface through them; `coordinates_mm` has the shape of the set's coordinates.
-    pub fn frame(&self, coordinates_mm: ArrayView2<'_, f64>, snapshot: usize) -> Frame {
+    /// Returns what is drawn of `snapshot`, or of the last one if there are fewer; `answers` have the shape of the set's
+    /// coordinates.
+    pub fn drawing(&self, answers: Option<&Array2<f64>>, snapshot: usize) -> Drawing {
+        let snapshot = snapshot.min(self.snapshots.len().saturating_sub(1));
         let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
-        let coordinates = samples.iter().flat_map(|&sample| coordinates_mm.row(sample).to_vec());
-        let coordinates: Vec<f64> = coordinates.collect();
-        self.frame_of(coordinates.chunks_exact(3).map(DVec3::from_slice))
-    }
-
-    /// Returns the surface through nodes at these positions, row by row.
-    pub fn frame_of(&self, nodes_mm: impl Iterator<Item = DVec3>) -> Frame {
-        let nodes_mm: Arc<[DVec3]> = nodes_mm.collect();
-        let z_mm: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
-        let grid_mm = self.surface.evaluate(&z_mm).into();
-        Frame { nodes_mm, grid_mm }
+        let nodes = |coordinates_mm: ArrayView2<'_, f64>| {
+            let rows = samples.iter().map(|&sample| coordinates_mm.row(sample).to_vec());
+            Vec::from_iter(rows.flat_map(|row| Vec::from_iter(row.chunks_exact(3).map(DVec3::from_slice))))
+        };
+        let decoded = answers.map_or(self.set.targets(), |answers| answers.view());
+        let nodes = [self.set.targets(), decoded].map(nodes);
+        let height_mm = self.sensor.geometry.height_mm;
+        let (heights, quantities) = (
+            height_mm - self.stroke_mm..=height_mm,
+            [Quantity::Height, Quantity::Error],
+        );
+        // Errors below a nanometre are not distinguished by colour.
+        let surfaces = Surface::compared("Decoded", &self.map, nodes, quantities, heights, 1e-6);
+        Drawing::of(surfaces, answers.is_some())
     }
 
     /// Returns the drops of the readings below those at rest, in percent, rows read × M4; `None` if there are no readings at
@@ -209,33 +194,6 @@ impl TestView {
     pub fn readings_ohm(&self, snapshot: usize) -> Array2<f64> {
         let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
         self.set.readings().select(Axis(0), samples)
-    }
-
-    /// Returns the surface of heights.
-    pub fn heights(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
-        Surface {
-            quantity: Quantity::Height,
-            range: match style.heights {
-                HeightScale::Stroke => self.z_range_mm(),
-                HeightScale::Fitted => frame.range_mm().unwrap_or_else(|| self.z_range_mm()),
-            },
-            ..self.errors(title, frame, style)
-        }
-    }
-
-    /// Returns the surface of errors of z.
-    pub fn errors(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
-        let locked = style.error_limit_mm.map(|limit| -limit..=limit);
-        Surface {
-            title: title.into(),
-            map: Arc::clone(&self.surface),
-            values: Arc::clone(&frame.grid_mm),
-            nodes: Arc::clone(&frame.nodes_mm),
-            quantity: Quantity::Error,
-            range: locked.unwrap_or_else(|| frame.symmetric_range_mm()),
-            mode: style.mode,
-            colours: style.colours,
-        }
     }
 }
 
@@ -276,43 +234,21 @@ pub enum TestViewError {
     Surface(#[from] SurfaceError),
 }
 
-/// Snapshot to be drawn.
-#[derive(Clone, Debug, Default)]
-pub struct Frame {
-    /// Position of each node, row by row.
-    pub nodes_mm: Arc<[DVec3]>,
-    /// Value at each grid point of the surface.
-    pub grid_mm: Arc<[f64]>,
+/// What is drawn of a sample of a test set.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    /// Actual surface.
+    pub actual: Surface,
+    /// Surface decoded by a network, and its error (decoded − actual).
+    pub decoded: Option<[Surface; 2]>,
 }
 
-impl Frame {
-    /// Returns `decoupled` minus this frame: z of the nodes and of the grid.
-    pub fn error_of(&self, decoupled: &Self) -> Self {
-        let nodes = self.nodes_mm.iter().zip(decoupled.nodes_mm.iter());
-        let grid = self.grid_mm.iter().zip(decoupled.grid_mm.iter());
+impl Drawing {
+    fn of([actual, decoded, error]: [Surface; 3], is_decoded: bool) -> Self {
         Self {
-            nodes_mm: nodes
-                .map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z))
-                .collect(),
-            grid_mm: grid.map(|(actual, decoupled)| decoupled - actual).collect(),
+            actual,
+            decoded: is_decoded.then_some([decoded, error]),
         }
-    }
-
-    /// Returns the lowest and highest z of a node; `None` without nodes.
-    pub fn range_mm(&self) -> Option<RangeInclusive<f64>> {
-        let heights = || self.nodes_mm.iter().map(|node| node.z).filter(|z| z.is_finite());
-        let (low, high) = (heights().reduce(f64::min)?, heights().reduce(f64::max)?);
-        // The resolution is a nanometre.
-        Some(low..=high.max(low + 1e-6))
-    }
-
-    /// Returns a range symmetric about zero that contains z of all nodes, so that zero keeps its colour.
-    pub fn symmetric_range_mm(&self) -> RangeInclusive<f64> {
-        let heights = self.nodes_mm.iter().map(|node| node.z.abs());
-        let largest = heights.filter(|z| z.is_finite()).fold(0.0, f64::max);
-        // The resolution is a nanometre.
-        let largest = largest.max(1e-6);
-        -largest..=largest
     }
 }
 
@@ -349,8 +285,8 @@ pub struct TargetCharts {
     pub lines: Vec<RegressionLine>,
     /// Errors of loading and unloading for each target that rises and falls.
     pub loops: Vec<Option<HysteresisLoop>>,
-    /// Error over the position, or the reason why there is none.
-    pub error_map: Result<Arc<HeatMap>, &'static str>,
+    /// Error over the position, if two targets are one.
+    pub error_map: Option<HeatMap>,
 }
 
 impl Positions {
@@ -382,6 +318,18 @@ impl RecordedTest {
         }
     }
 
+    /// Returns what is drawn of `sample`, or of the last one if there are fewer.
+    pub fn drawing(&self, answers: Option<&Array2<f64>>, sample: usize) -> Option<Drawing> {
+        let Positions::Surface(through) = &self.positions else {
+            return None;
+        };
+        let sample = sample.min(self.set.samples().saturating_sub(1));
+        let decoded = answers.map_or(self.set.targets(), |answers| answers.view());
+        let [actual, decoded] = [self.set.targets(), decoded].map(|values| values.row(sample).to_vec());
+        let surfaces = through.surfaces(&actual, &decoded, through.range_of(&self.ranges));
+        Some(Drawing::of(surfaces, answers.is_some()))
+    }
+
     /// Computes the charts of these decoded values (samples × targets).
     pub fn charts(&self, answers: &Array2<f64>) -> TargetCharts {
         let line = |target| {
@@ -394,21 +342,17 @@ impl RecordedTest {
             error_map: match &self.positions {
                 // Targets that have positions are not positions themselves.
                 Positions::None => error_map(&self.set, answers, &self.problem.targets),
-                _ => Err(NO_PAIR),
+                _ => None,
             },
         }
     }
 }
 
-const NO_PAIR: &str = "A map needs two targets that are positions: lengths in the same unit, or both without a unit.";
-
-fn error_map(set: &Dataset, answers: &Array2<f64>, targets: &[Channel]) -> Result<Arc<HeatMap>, &'static str> {
-    let pair = position_pair(targets).ok_or(NO_PAIR)?;
+fn error_map(set: &Dataset, answers: &Array2<f64>, targets: &[Channel]) -> Option<HeatMap> {
+    let pair = position_pair(targets)?;
     let [actual, answers] = [set.targets(), answers.view()].map(|values| values.select(Axis(1), &pair));
     let names = pair.map(|target| targets[target].name.as_str());
-    let map = position_error_map(actual.view(), answers.view(), names, targets[pair[0]].unit.as_deref());
-    map.map(Arc::new)
-        .ok_or("The positions of the test samples do not vary, so there is no map.")
+    position_error_map(actual.view(), answers.view(), names, targets[pair[0]].unit.as_deref())
 }
 
 /// Returns two targets that are coordinates in the same unit, for a map: lengths, or targets without units whose names are

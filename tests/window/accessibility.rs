@@ -6,14 +6,7 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::driver::Driver;
 
-const VIEWS: [&str; 6] = [
-    "Train",
-    "Experiments",
-    "Compare",
-    "Identifiability",
-    "Trade-off",
-    "Live",
-];
+const VIEWS: [&str; 5] = ["Train", "Study", "Compare", "Sensor", "Live"];
 
 /// Roles of controls.
 const CONTROLS: [Role; 10] = [
@@ -32,7 +25,7 @@ const CONTROLS: [Role; 10] = [
 /// Opens a view and waits for its initial contents.
 fn show(driver: &mut Driver, view: &str) {
     driver.click_button(view);
-    if view == "Identifiability" {
+    if view == "Sensor" {
         driver.wait("the analysis", |driver| driver.says("Condition number: "));
     }
     driver.settle();

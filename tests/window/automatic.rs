@@ -13,10 +13,10 @@ use decoupler_core::{evaluation::RunSettings, training::StoppingRules};
 const CHOSEN: [(&str, Option<&str>); 6] = [
     ("Hidden nodes", None),
     ("Method", None),
-    ("Inputs and scaling", Some("Network inputs")),
+    ("Scaling", Some("Network inputs")),
     ("Epochs", Some("When to stop")),
-    ("Starts", Some("Method settings")),
-    ("Combine starts", Some("Method settings")),
+    ("Restarts", Some("Method settings")),
+    ("Combine restarts", Some("Method settings")),
 ];
 
 fn unfold(driver: &mut Driver) {
@@ -55,8 +55,8 @@ fn chosen_settings_are_disabled_show_what_was_chosen_and_are_kept_when_the_choic
         ("Hidden nodes", chosen.hidden.to_string()),
         ("Method", chosen.training.method.name().to_owned()),
         ("Epochs", chosen.training.stopping.epochs.to_string()),
-        ("Starts", chosen.starts.to_string()),
-        ("Combine starts", "average their answers".to_owned()),
+        ("Restarts", chosen.starts.to_string()),
+        ("Combine restarts", "average their answers".to_owned()),
     ];
     for (name, value) in &expected {
         assert_eq!(fixed(&driver, name), *value, "{name}");
@@ -68,12 +68,12 @@ fn chosen_settings_are_disabled_show_what_was_chosen_and_are_kept_when_the_choic
         driver.state().setup().ok().as_ref() == Some(&setup)
     });
     driver.settle();
-    for name in ["Hidden nodes", "Method", "Epochs", "Starts", "Combine starts"] {
+    for name in ["Hidden nodes", "Method", "Epochs", "Restarts", "Combine restarts"] {
         assert!(driver.is_enabled(name), "{name}");
     }
     assert_eq!(driver.state().settings(), chosen);
     // The trained network can be trained further.
-    assert!(driver.has("Continue"));
+    assert!(driver.has("Train longer"));
 }
 
 #[test]
@@ -92,11 +92,11 @@ fn another_seed_is_no_setting_of_the_choice_but_another_plan_is_chosen_for_again
 #[test]
 fn a_given_memory_is_kept_by_the_choice() {
     let (mut driver, _path, _folder) = opened(90);
-    driver.unfold_to("Memory", "Lags");
+    driver.unfold_to("History of readings", "Lags");
     assert!(driver.says("Chosen automatically while these fields are empty"));
     driver.enter("Lags", "3");
     driver.settle();
-    assert!(driver.says(", fixed"), "{:#?}", driver.texts());
+    assert!(driver.says("lags 3"), "{:#?}", driver.texts());
     driver.click("▶ Train");
     driver.wait_for_training();
     let run = driver.state().run.as_ref().unwrap();
@@ -118,7 +118,7 @@ fn one_network_per_row_wire_is_set_by_hand() {
     }
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.mean("row", "row-wire");
-    driver.unfold_to("Network inputs", "Inputs and scaling");
+    driver.unfold_to("Network inputs", "Scaling");
     assert!(driver.is_enabled("Choose settings automatically"));
     driver.click_button("Known");
     driver.settle();

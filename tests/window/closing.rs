@@ -3,7 +3,7 @@
 use std::{fs, path::Path, time::Instant};
 
 use decoupler::window::{Effect, Phase};
-use decoupler_core::{job::Job, training::StopReason};
+use decoupler_core::job::Job;
 use decoupler_files::export::CheckpointFile;
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 
@@ -11,14 +11,16 @@ use crate::{
     configuring::choose_method,
     driver::{Driver, PATIENCE},
     experiments::{run_to_the_end, tiny},
-    recordings::opened,
+    intervals::noisy,
+    recordings::{opened, written},
     trading,
     training::{endless, start_endless},
 };
 
-const SAVE: &str = "Save checkpoints and close…";
+const SAVE: &str = "Save training and close";
 const QUESTION: &str = "Close with unsaved work?";
-const DISCARD: &str = "Discard and close";
+const CLOSE: &str = "Close";
+const STAY: &str = "Cancel";
 
 /// Returns true if the window sent this command in the last frame.
 fn asked(driver: &mut Driver, command: &ViewportCommand) -> bool {
@@ -75,19 +77,22 @@ fn an_unfinished_training_is_asked_about_once_and_continues_if_the_user_stays() 
         "{:#?}",
         driver.texts()
     );
-    assert!(driver.says(" of 1000000") && driver.has("can be saved as a checkpoint"));
+    assert!(
+        driver.says(" of 1000000") && !driver.has(SAVE),
+        "nothing is kept by this window"
+    );
     driver.press(Key::Escape);
     assert!(!driver.has(QUESTION));
     driver.wait_for_epochs(3);
     assert!(!close(&mut driver));
     driver.harness().step();
-    driver.click_button("Stay");
+    driver.click_button(STAY);
     driver.wait_for_epochs(3);
     assert_eq!(driver.state().phase, Phase::Training);
 
     assert!(!close(&mut driver));
     driver.harness().step();
-    driver.click_button(DISCARD);
+    driver.click_button(CLOSE);
     wait_for_closing(&mut driver);
 }
 
@@ -110,7 +115,7 @@ fn runs_that_could_not_be_written_are_asked_about_and_written_later() {
         "{:#?}",
         driver.texts()
     );
-    driver.click_button("Stay");
+    driver.click_button(STAY);
     fs::remove_file(&runs).unwrap();
     fs::create_dir(&runs).unwrap();
     driver.harness().event(eframe::egui::Event::WindowFocused(true));
@@ -123,62 +128,29 @@ fn runs_that_could_not_be_written_are_asked_about_and_written_later() {
 #[test]
 fn a_training_saved_on_closing_resumes_where_it_stopped() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("kept.checkpoint");
-    let mut driver = Driver::open();
+    let mut driver = Driver::open_keeping_trainings(folder.path());
     start_endless(&mut driver);
-    assert!(!close(&mut driver));
-    driver.harness().step();
-    driver.click_button(SAVE);
-    driver.harness().run_steps(5);
-    // Cancelling the path keeps the window open.
-    driver.click_button("Cancel");
-    driver.wait_for_epochs(3);
-    assert!(!driver.has(SAVE));
-
-    assert!(!close(&mut driver));
-    driver.harness().step();
+    ask(&mut driver);
     let shown = driver.epochs();
     driver.click_button(SAVE);
-    driver.harness().run_steps(5);
-    driver.type_into("File", &path.display().to_string());
-    driver.click_button("Save");
     wait_for_closing(&mut driver);
     drop(driver);
-    assert_eq!(files_in(folder.path()), ["kept.checkpoint"]);
-    let file = CheckpointFile::load(&path).unwrap();
+    let file = CheckpointFile::load(&folder.path().join("training-1.checkpoint")).unwrap();
     assert_eq!(file.settings, endless());
     let run = file.resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
     assert!(run.leader().latest().epoch >= shown && run.stop_reason().is_none());
-}
-
-#[test]
-fn a_checkpoint_that_cannot_be_saved_keeps_the_window_open() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut driver = Driver::open();
-    start_endless(&mut driver);
-    assert!(!close(&mut driver));
-    driver.harness().step();
-    driver.click_button(SAVE);
-    driver.harness().run_steps(5);
-    driver.type_into("File", &folder.path().join("none/file").display().to_string());
-    driver.click_button("Save");
-    driver.wait("the reason", |driver| driver.says("does not exist; make it first"));
-    assert!(!asked(&mut driver, &ViewportCommand::Close));
-    driver.wait_for_epochs(3);
-    driver.click("■ Stop");
-    driver.wait("the end", |driver| {
-        driver.state().phase == Phase::Ended(StopReason::Stopped)
-    });
-    assert!(close(&mut driver));
+    let mut driver = Driver::open_keeping_trainings(folder.path());
+    driver.wait("the offer", |driver| driver.says("Resume the training of "));
 }
 
 #[test]
 fn a_training_that_ends_during_the_question_moves_no_button_and_does_not_close_the_window() {
-    let mut driver = Driver::open();
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open_keeping_trainings(folder.path());
     start_endless(&mut driver);
     ask(&mut driver);
-    let places = |driver: &mut Driver, labels: [&str; 3]| labels.map(|label| driver.get(label).rect());
-    let before = places(&mut driver, ["Stay", DISCARD, SAVE]);
+    let places = |driver: &mut Driver| [STAY, CLOSE, SAVE].map(|label| driver.get(label).rect());
+    let before = places(&mut driver);
     driver.window_mut().apply(Effect::Stop);
     let latest = Instant::now() + PATIENCE;
     while !driver.says("has ended") {
@@ -187,9 +159,9 @@ fn a_training_that_ends_during_the_question_moves_no_button_and_does_not_close_t
     }
     driver.harness().run_steps(5);
     assert!(!asked(&mut driver, &ViewportCommand::Close));
-    assert!(driver.has("Train: Training") && !driver.is_enabled(SAVE) && !driver.has(DISCARD));
-    assert_eq!(places(&mut driver, ["Stay", "Close", SAVE]), before);
-    driver.click_button("Close");
+    assert!(driver.has("Train: Training"));
+    assert_eq!(places(&mut driver), before);
+    driver.click_button(CLOSE);
     wait_for_closing(&mut driver);
 }
 
@@ -202,7 +174,11 @@ fn ask(driver: &mut Driver) {
 
 #[test]
 fn a_training_on_a_recording_is_saved_at_closing() {
-    let (mut driver, _path, folder) = opened(60);
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &noisy(60));
+    let kept = folder.path().join("data");
+    let mut driver = Driver::open_keeping_trainings(&kept);
+    driver.open_recordings(&[&path]);
     driver.choose_by_hand();
     choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.limit_epochs("1000000");
@@ -210,42 +186,28 @@ fn a_training_on_a_recording_is_saved_at_closing() {
     driver.wait_for_epochs(3);
     ask(&mut driver);
     driver.click_button(SAVE);
-    let path = folder.path().join("kept.checkpoint");
-    driver.harness().run_steps(5);
-    driver.type_into("File", &path.display().to_string());
-    driver.click_button("Save");
     wait_for_closing(&mut driver);
     drop(driver);
-    let file = CheckpointFile::load(&path).unwrap();
+    let file = CheckpointFile::load(&kept.join("training-1.checkpoint")).unwrap();
     assert_eq!(file.settings.training.stopping.epochs, 1_000_000);
-    assert!(
-        file.resume(&Job::UNINTERRUPTED, &mut |_| ())
-            .unwrap()
-            .0
-            .leader()
-            .latest()
-            .epoch
-            >= 3
-    );
+    let run = file.resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
+    assert!(run.leader().latest().epoch >= 3);
 }
 
 #[test]
 fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
-    for (view, run, line) in [
-        ("Experiments", "▶ Run", "Experiments: Experiment"),
-        ("Trade-off", "▶ Measure", "Trade-off: Measurement"),
+    for (topic, run, line) in [
+        ("Table 1", "▶ Run", "Study: Table 1"),
+        ("Speed against accuracy", "▶ Measure", "Study: Speed against accuracy"),
     ] {
         let mut driver = Driver::open();
-        driver.click_button(view);
+        driver.click_button("Study");
+        driver.click(topic);
         driver.click(run);
         ask(&mut driver);
-        assert!(
-            driver.has(line) && driver.has("will be discarded"),
-            "{:#?}",
-            driver.texts()
-        );
-        assert!(driver.says("0 of ") && !driver.is_enabled(SAVE));
-        driver.click_button("Stay");
+        assert!(driver.has(line), "{:#?}", driver.texts());
+        assert!(driver.says("0 of ") && !driver.has(SAVE));
+        driver.click_button(STAY);
         driver.click("■ Cancel");
         assert!(close(&mut driver), "nothing is running any more");
     }
@@ -255,38 +217,35 @@ fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
 fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open();
-    driver.click_button("Experiments");
+    driver.click_button("Study");
     tiny(&mut driver);
     run_to_the_end(&mut driver);
     ask(&mut driver);
-    assert!(
-        driver.has("Experiments: Table 1") && driver.has("will be discarded"),
-        "{:#?}",
-        driver.texts()
-    );
+    assert!(driver.has("Study: Table 1"), "{:#?}", driver.texts());
     assert!(
         driver.has("2 trials finished, not exported as a table"),
         "{:#?}",
         driver.texts()
     );
-    driver.click_button("Stay");
+    driver.click_button(STAY);
     // Asking for a path saves nothing.
     driver.export("Table, CSV");
     driver.click_button("Cancel");
     ask(&mut driver);
-    driver.click_button("Stay");
+    driver.click_button(STAY);
     driver.save("Table, CSV", &folder.path().join("table.csv"));
     assert!(close(&mut driver));
 
     let mut driver = Driver::open();
     driver.click("10×6");
-    driver.click_button("Trade-off");
+    driver.click_button("Study");
+    driver.click("Speed against accuracy");
     trading::tiny(&mut driver);
     driver.type_into("Noise levels", "0");
     trading::measure(&mut driver);
     ask(&mut driver);
-    assert!(driver.has("Trade-off: Measurement") && driver.says("not exported as a table"));
-    driver.click_button("Stay");
+    assert!(driver.has("Study: Speed against accuracy") && driver.says("not exported as a table"));
+    driver.click_button(STAY);
     driver.save("All points, CSV", &folder.path().join("points.csv"));
     assert!(close(&mut driver));
 }
@@ -295,26 +254,27 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
 fn a_cross_validation_and_an_analysis_are_not_ended_without_asking() {
     let (mut driver, _path, _folder) = opened(160);
     driver.limit_epochs("100000");
-    driver.click_button("Identifiability");
-    driver.click_button("Cross-validate");
+    driver.click_button("Study");
+    driver.click("Cross-validation");
+    driver.click_button("▶ Cross-validate");
     ask(&mut driver);
     assert!(
-        driver.has("Identifiability: Cross-validation") && driver.has("5 folds"),
+        driver.has("Study: Cross-validation") && driver.says("5 trainings"),
         "{:#?}",
         driver.texts()
     );
-    assert!(driver.has("will be discarded"));
-    driver.click_button("Stay");
+    driver.click_button(STAY);
     driver.click("■ Cancel");
     driver.settle();
-    driver.click_button("Analyse readings");
+    driver.click("What the readings determine");
+    driver.click_button("▶ Analyse");
     ask(&mut driver);
     assert!(
-        driver.has("Identifiability: Analysis") && driver.has("will be discarded"),
+        driver.has("Study: What the readings determine"),
         "{:#?}",
         driver.texts()
     );
-    driver.click_button(DISCARD);
+    driver.click_button(CLOSE);
     wait_for_closing(&mut driver);
 }
 
@@ -345,11 +305,16 @@ fn a_file_being_written_is_finished_before_the_window_closes() {
     driver.click_button("Save");
     assert!(!close(&mut driver));
     driver.harness().step();
-    assert!(driver.has("Finishing files") && driver.says("pipe. The window will close afterwards"));
-    driver.click_button("Stay");
-    assert!(!driver.has("Finishing files"));
+    assert!(
+        driver.says("pipe") && driver.says("is being written"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.click_button(STAY);
     assert!(!close(&mut driver));
+    driver.harness().step();
     let reading = std::thread::spawn(move || fs::read_to_string(pipe).unwrap());
+    driver.click_button(CLOSE);
     wait_for_closing(&mut driver);
     drop(driver);
     let table = reading.join().unwrap();

@@ -31,7 +31,7 @@ fn the_window_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
         "{value}"
     );
     assert!(driver.says("1 of 10"), "100 test samples are 10 snapshots of 10 rows");
-    assert!(!driver.has("Decoupled surface"));
+    assert!(!driver.has("Decoded surface"));
 }
 
 #[test]
@@ -52,7 +52,9 @@ fn the_baselines_are_shown_before_a_training() {
     assert_eq!(driver.table()[..expected.len()], expected);
     assert!(driver.has("Published") && driver.says("Press Train to fill in the network's row"));
     driver.open_menu();
-    assert!(!driver.is_enabled("ONNX, f64") && driver.says("Nothing is trained yet"));
+    assert!(!driver.is_enabled("Network…"));
+    driver.get("Network…").hover();
+    driver.wait("the reason", |driver| driver.says("Nothing is trained yet"));
     driver.press(eframe::egui::Key::Escape);
 
     // Other samples to train on, the same to test on.
@@ -82,8 +84,8 @@ fn presets_set_the_array_and_its_surface_follows() {
         assert_eq!(driver.state().draft.simulation().unwrap().sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
-            let frame = &driver.views().train.drawn.frames.actual;
-            frame.nodes_mm.len() == scale.rows() * scale.nodes_per_row()
+            let drawn = driver.views().train.drawn.surfaces.as_ref();
+            drawn.is_some_and(|drawn| drawn.actual.nodes.len() == scale.rows() * scale.nodes_per_row())
         });
     }
     driver.settle();
@@ -222,9 +224,11 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
         .views()
         .train
         .drawn
-        .frames
+        .surfaces
+        .as_ref()
+        .unwrap()
         .actual
-        .nodes_mm
+        .nodes
         .iter()
         .map(|node| node.x)
         .collect();
@@ -263,10 +267,10 @@ fn changing_the_settings_hides_old_results_and_changing_them_back_restores_them(
     driver.click("10×8");
     driver.wait("the other array's surface", |driver| driver.state().preview.is_some());
     let networks = driver.table().into_iter().filter(|cell| cell.starts_with("network, "));
-    assert!(networks.into_iter().all(|cell| cell.ends_with('–')) && !driver.has("Decoupled surface"));
+    assert!(networks.into_iter().all(|cell| cell.ends_with('–')) && !driver.has("Decoded surface"));
     driver.click("10×6");
     assert_eq!(driver.table(), table);
-    assert!(driver.has("Decoupled surface"));
+    assert!(driver.has("Decoded surface"));
 
     // Faster than the worker draws the other array.
     assert!(driver.becomes_idle());

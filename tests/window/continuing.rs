@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, time::Duration};
 
-use decoupler::window::{Notice, Phase};
+use decoupler::window::{Effect, Notice, Phase};
 use decoupler_core::{
     evaluation::{Run, RunSettings, Spread, StartRecord},
     job::Job,
@@ -19,7 +19,7 @@ use crate::{
 };
 
 const SAVE: &str = "Checkpoint, resumable";
-const OPEN: &str = "Type the path of a checkpoint";
+const OPEN: &str = "Open checkpoint…";
 
 /// Types `path` into the form behind `button` and confirms.
 fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
@@ -30,6 +30,11 @@ fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
     }
     driver.type_into("File", &path.display().to_string());
     driver.click_button(if button == OPEN { "Open" } else { "Save" });
+}
+
+/// Opens a checkpoint without scrolling to the button, which would move the table and the times out of view.
+fn open(driver: &mut Driver, path: &Path) {
+    driver.window_mut().apply(Effect::OpenTraining(path.to_owned()));
 }
 
 fn save(driver: &mut Driver, button: &str, path: &Path) {
@@ -87,7 +92,7 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
         assert_eq!(shown.starts, starts);
         assert_eq!(shown.history, run.leader().history());
         opened.driver.assert_shows(&network_figures(&run));
-        assert!(opened.driver.has("SPREAD OVER 4 STARTS"));
+        assert!(opened.driver.has("SPREAD OVER 4 RESTARTS"));
         let percent = Spread::of(starts.iter().filter_map(StartRecord::percent)).unwrap();
         let validation = Spread::of(starts.iter().map(StartRecord::deciding_mse)).unwrap();
         assert!(percent.smallest < percent.largest, "the starts differ");
@@ -120,7 +125,7 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
 fn the_spread_is_shown_while_the_starts_train() {
     let mut driver = Driver::open();
     driver.configure_small();
-    driver.enter("Starts", "3");
+    driver.enter("Restarts", "3");
     choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.enter("Epochs", "1000000");
     driver.click("▶ Train");
@@ -129,7 +134,7 @@ fn the_spread_is_shown_while_the_starts_train() {
         driver.state().phase == Phase::Training
             && starts.is_some_and(|starts| starts.len() == 3 && starts[0].epochs > 1)
     });
-    assert!(driver.has("SPREAD OVER 3 STARTS") && driver.has("0 of 3 starts ended"));
+    assert!(driver.has("SPREAD OVER 3 RESTARTS") && driver.has("0 of 3 restarts ended"));
     driver.click("■ Stop");
     ended(&mut driver);
     let settings = RunSettings {
@@ -153,7 +158,8 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
         driver.click("▶ Train");
         driver.wait_for_epochs(5);
         driver.open_menu();
-        assert!(!driver.is_enabled(SAVE), "a training is paused first");
+        driver.choose_export(SAVE);
+        assert!(!driver.is_enabled("Save…"), "a training is paused first");
         assert!(driver.says("A training under way cannot be saved"));
         driver.press(eframe::egui::Key::Escape);
         pause(driver);
@@ -209,7 +215,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     let mut driver = Driver::open();
     enter_path(&mut driver, OPEN, &terminal);
     driver.wait("the training", |driver| driver.epochs() == 7);
-    assert!(driver.state().draft == settings && driver.has("SPREAD OVER 3 STARTS"));
+    assert!(driver.state().draft == settings && driver.has("SPREAD OVER 3 RESTARTS"));
     save(&mut driver, SAVE, &window);
     driver.click("▶ Resume");
     ended(&mut driver);
@@ -230,7 +236,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     driver.wait("the ended training", |driver| {
         driver.state().phase == Phase::Ended(StopReason::EpochsReached)
     });
-    assert!(driver.has("Continue"));
+    assert!(driver.has("Train longer"));
 }
 
 /// Starts run in parallel: their wall time is saved, and without it no time is shown.
@@ -243,13 +249,13 @@ fn a_checkpoint_shows_the_wall_time_of_all_starts_or_none() {
         file.wall_time = saved.map(Duration::from_secs);
         file.save(&path).unwrap();
         let mut driver = Driver::open();
-        enter_path(&mut driver, OPEN, &path);
+        open(&mut driver, &path);
         driver.wait("the training", |driver| {
             let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());
             result.is_some_and(|result| result.wall_time == file.wall_time)
         });
         let texts = driver.texts();
-        for (name, value) in [("Training, all starts", all), ("Time per epoch", an_epoch)] {
+        for (name, value) in [("Training, all restarts", all), ("Time per epoch", an_epoch)] {
             let place = texts.iter().rposition(|text| text == name).unwrap();
             assert_eq!(texts[place + 1], value, "{texts:#?}");
         }
@@ -277,7 +283,7 @@ fn an_invalid_or_damaged_checkpoint_is_explained_and_changes_nothing() {
     ];
     for (reason, contents) in cases {
         fs::write(&path, &contents).unwrap();
-        enter_path(&mut driver, OPEN, &path);
+        open(&mut driver, &path);
         driver.wait("the reason", |driver| driver.notice().is_some());
         let expected = CheckpointFile::load(&path).unwrap_err().to_string();
         assert!(expected.contains(reason), "{expected}");
@@ -290,7 +296,7 @@ fn an_invalid_or_damaged_checkpoint_is_explained_and_changes_nothing() {
         driver.click("Dismiss");
     }
     fs::write(&path, &intact).unwrap();
-    enter_path(&mut driver, OPEN, &path);
+    open(&mut driver, &path);
     driver.wait("the intact one", |driver| driver.state().phase == Phase::Paused);
 }
 
@@ -302,7 +308,7 @@ fn levenberg_marquardt_continues_where_momentum_ended() {
     driver.train();
     assert_eq!(driver.epochs(), 15);
     choose_method(&mut driver, "Levenberg-Marquardt");
-    driver.click("Continue");
+    driver.click("Train longer");
     ended(&mut driver);
     let mut run = trained(momentum(15));
     run.continue_with(Method::default()).unwrap();
@@ -330,7 +336,7 @@ fn levenberg_marquardt_continues_where_momentum_ended() {
     assert!(driver.says(" from epoch 15"));
 
     driver.enter("Hidden nodes", "7");
-    assert!(!driver.has("Continue"), "another network begins again");
+    assert!(!driver.has("Train longer"), "another network begins again");
 }
 
 #[test]
@@ -340,7 +346,7 @@ fn more_epochs_of_the_same_method_give_the_result_of_a_longer_training() {
         opened.change(|settings| settings.training = momentum(15).training);
         let (driver, setup) = (&mut opened.driver, &opened.setup);
         driver.train();
-        driver.click("Continue");
+        driver.click("Train longer");
         ended(driver);
         let whole = run_of(&with_epochs(setup, 30));
         assert_eq!(driver.state().run.as_ref().unwrap().history, whole.leader().history());
@@ -356,10 +362,10 @@ fn a_paused_training_can_be_continued_with_another_method_or_resumed_as_it_was()
     let mut driver = Driver::open();
     start_endless(&mut driver);
     pause(&mut driver);
-    assert!(!driver.has("Continue"), "Resume does that");
-    assert!(!driver.is_enabled("Hidden nodes") && !driver.is_enabled("Starts"));
+    assert!(!driver.has("Train longer"), "Resume does that");
+    assert!(!driver.is_enabled("Hidden nodes") && !driver.is_enabled("Restarts"));
     choose_method(&mut driver, "Levenberg-Marquardt");
-    assert!(driver.has("Continue"));
+    assert!(driver.has("Train longer"));
     driver.click("▶ Resume");
     assert_eq!(driver.state().draft, momentum(1_000_000), "as it was");
     driver.wait_for_epochs(5);
@@ -369,7 +375,7 @@ fn a_paused_training_can_be_continued_with_another_method_or_resumed_as_it_was()
     choose_method(&mut driver, "Levenberg-Marquardt");
     driver.enter("Mu", "1e-2");
     driver.enter("Epochs", "4");
-    driver.click("Continue");
+    driver.click("Train longer");
     ended(&mut driver);
     let mut run = stepped(momentum(1_000_000), held);
     let training = driver.state().draft.training;
@@ -387,7 +393,7 @@ fn a_paused_training_can_be_continued_with_another_method_or_resumed_as_it_was()
 #[test]
 fn continue_is_not_offered_without_a_training_or_after_divergence() {
     let mut driver = Driver::open();
-    assert!(!driver.has("Continue"), "there is nothing to continue from");
+    assert!(!driver.has("Train longer"), "there is nothing to continue from");
     driver.configure_small();
     choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.enter("Learning rate", "1e6");
@@ -395,7 +401,7 @@ fn continue_is_not_offered_without_a_training_or_after_divergence() {
     driver.enter("Epochs", "100000");
     driver.train();
     assert_eq!(driver.state().phase, Phase::Ended(StopReason::Diverged));
-    assert!(!driver.has("Continue"));
+    assert!(!driver.has("Train longer"));
 }
 
 #[test]
@@ -420,11 +426,11 @@ fn bayesian_regularisation_says_how_many_weights_the_data_determine() {
 #[test]
 fn the_spread_and_continue_fit_in_narrow_windows() {
     let mut driver = Driver::open_sized(vec2(960.0, 640.0));
-    driver.enter("Starts", "3");
+    driver.enter("Restarts", "3");
     driver.enter("Epochs", "1");
     driver.train();
     driver.settle();
-    let buttons = ["Next snapshot", "Continue", "▶ Train", "⏸ Pause"].map(|label| driver.get(label).rect());
+    let buttons = ["Next snapshot", "Train longer", "▶ Train", "⏸ Pause"].map(|label| driver.get(label).rect());
     assert!(
         buttons.windows(2).all(|pair| pair[0].right() <= pair[1].left()),
         "{buttons:?}"

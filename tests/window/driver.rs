@@ -42,9 +42,6 @@ const FOLDED: [&str; 7] = [
     "Figures of the paper",
 ];
 
-/// Label of the button that ends the tour.
-pub(crate) const SKIP: &str = "Skip the tour";
-
 /// Label of the button that closes a notice.
 const DISMISS: &str = "Dismiss";
 
@@ -90,22 +87,14 @@ impl Driver {
         Self::open_as(vec2(1440.0, 900.0), None, keeping).on_the_papers_scene()
     }
 
-    /// Opens the window with its state remembered in a file; the tour has ended.
+    /// Opens the window with its state remembered in a file.
     pub(crate) fn open_remembering(path: &Path) -> Self {
-        let mut driver = Self::open_on_tour(path);
-        if driver.has(SKIP) {
-            driver.click(SKIP);
-        }
+        let file = WindowFile::read(path.to_owned());
+        let mut driver = Self::open_as(vec2(1440.0, 900.0), Some(file), |window| window);
         if driver.shown() == "Train" && driver.state().source == SourceKind::Array {
             driver.unfold();
         }
         driver
-    }
-
-    /// Opens the window with its state remembered in a file, and with the tour unless that has ended before.
-    pub(crate) fn open_on_tour(path: &Path) -> Self {
-        let file = WindowFile::read(path.to_owned());
-        Self::open_as(vec2(1440.0, 900.0), Some(file), |window| window)
     }
 
     fn open_as(
@@ -362,25 +351,96 @@ impl Driver {
     /// Opens the Export menu. It stays open while others read it.
     #[track_caller]
     pub(crate) fn open_menu(&mut self) {
-        if !self.has("Error table, CSV") && !self.says(", SVG") {
+        if !self.has("Figure…") {
             self.click_button("Export");
             self.harness.run_steps(2);
         }
     }
 
-    /// Asks for the export of this name in the menu, "Error table, CSV", until its form is open: events may move the items
-    /// of the menu away from the pointer.
+    /// Chooses an export in its dialog: "Error table, CSV", "ONNX, f32", "A: Report, HTML", "Recipe, JSON".
+    #[track_caller]
+    pub(crate) fn choose_export(&mut self, name: &str) {
+        let (thing, form) = name.rsplit_once(", ").unwrap_or_else(|| panic!("{name} has no form"));
+        let (letter, thing) = thing
+            .split_once(": ")
+            .map_or(("", thing), |(letter, thing)| (letter, thing));
+        let (line, title, choices) = match (thing, form) {
+            ("Report", "HTML") => ("Report…", "Export report", vec![("Report", letter)]),
+            (thing, "f64" | "f32" | "fixed16") => {
+                let choices = vec![("Network", letter), ("Format", thing), ("Precision", form)];
+                ("Network…", "Export network", choices)
+            }
+            (thing, _) if thing.starts_with("Network file") => {
+                let past = thing.split_once(" of ").map_or("", |_| "Displayed network");
+                let network = if letter.is_empty() { past } else { letter };
+                let choices = vec![("Network", network), ("Format", "Network file")];
+                ("Network…", "Export network", choices)
+            }
+            (thing, "SVG" | "PNG" | "Copy") => ("Figure…", "Export figure", vec![("Figure", thing), ("Format", form)]),
+            (thing, form) => ("Data…", "Export data", vec![("Data", thing), ("Format", form)]),
+        };
+        self.open_menu();
+        self.click_button(line);
+        self.harness.run_steps(SCROLLING);
+        if self.has(title) {
+            choices
+                .into_iter()
+                .for_each(|(list, option)| self.choose_in_dialog(list, option));
+        }
+    }
+
+    /// Chooses the option that begins with this text, if the dialog has the list.
+    #[track_caller]
+    pub(crate) fn choose_in_dialog(&mut self, list: &str, option: &str) {
+        let by = By::new().role(Role::ComboBox).label(list);
+        let lists: Vec<_> = self.harness.query_all(by).collect();
+        let Some(list) = lists.first().filter(|_| !option.is_empty()) else {
+            return;
+        };
+        list.click();
+        self.harness.run_steps(SCROLLING);
+        let begins = |node: &Node<'_>| {
+            node.accesskit_node()
+                .label()
+                .is_some_and(|label| label.starts_with(option))
+        };
+        let options: Vec<_> = self
+            .harness
+            .query_all(By::new().role(Role::Button))
+            .filter(begins)
+            .collect();
+        let newest = options.last();
+        newest
+            .unwrap_or_else(|| panic!("no {option} among {:#?}", self.texts()))
+            .click();
+        self.harness.run_steps(SCROLLING);
+    }
+
+    /// Asks for an export until the form for its path is open: events may move the items of the menu away from the pointer.
     #[track_caller]
     pub(crate) fn export(&mut self, name: &str) {
         for _ in 0..5 {
-            self.open_menu();
-            self.click_button(name);
+            match name.strip_suffix('…') {
+                Some(_) => self.click_button(name),
+                None => self.choose_export(name),
+            }
+            if self.has("Save…") {
+                self.click_button("Save…");
+            }
             self.harness.run_steps(SCROLLING);
             if self.has("File") {
                 return;
             }
+            self.press(Key::Escape);
         }
         panic!("no form came; the window shows {:#?}", self.texts());
+    }
+
+    /// Copies a thing in this form: "Error table, Copy as Markdown". Returns the text on the clipboard.
+    #[track_caller]
+    pub(crate) fn copy(&mut self, name: &str) -> Option<String> {
+        self.choose_export(name);
+        self.click_and_copy("Copy")
     }
 
     /// Types `path` into the form of the export of this name and saves; waits for the answer.
@@ -433,16 +493,21 @@ impl Driver {
     #[track_caller]
     pub(crate) fn click_and_copy(&mut self, label: &str) -> Option<String> {
         self.get(label).click();
-        let mut copied = None;
-        for _ in 0..3 {
+        // It is copied in the background.
+        for _ in 0..200 {
             self.harness.step();
             let commands = &self.harness.output().platform_output.commands;
-            copied = copied.or(commands.iter().find_map(|command| match command {
+            let copied = commands.iter().find_map(|command| match command {
                 OutputCommand::CopyText(text) => Some(text.clone()),
                 _ => None,
-            }));
+            });
+            if copied.is_some() {
+                self.harness.run_steps(2);
+                return copied;
+            }
+            std::thread::sleep(Duration::from_millis(5));
         }
-        copied
+        None
     }
 
     /// Presses a key.

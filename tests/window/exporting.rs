@@ -165,6 +165,7 @@ fn enter_saves_and_the_suggested_name_distinguishes_runs() {
     driver.enter("File", &path.display().to_string());
     driver.wait("the file", |driver| driver.says("Saved "));
     assert_eq!(names(folder.path()), ["loss.csv"]);
+    assert!(driver.has("Open folder"));
 }
 
 #[test]
@@ -245,12 +246,8 @@ fn tables_are_copied_as_displayed() {
         } = trained_small(source);
         let figures = network_figures(&run_of(&setup));
         for form in ["Markdown", "LaTeX", "tab-separated"] {
-            driver.open_menu();
-            let name = format!("Copy error table as {form}");
-            driver.get(&name).scroll_to_me();
-            driver.harness().run_steps(5);
-            let copied = driver.click_and_copy(&name);
-            let copied = copied.unwrap_or_else(|| panic!("{name} copied nothing"));
+            let copied = driver.copy(&format!("Error table, Copy as {form}"));
+            let copied = copied.unwrap_or_else(|| panic!("{form} copied nothing"));
             let mut numbers = Vec::new();
             for line in copied.lines().filter(|line| line.contains("network")) {
                 let cells = line.split(['\t', '|', '&', ' ']).map(str::trim);
@@ -276,28 +273,15 @@ fn tables_are_copied_as_displayed() {
 #[test]
 fn the_menu_says_in_each_view_why_nothing_can_be_exported_yet() {
     let mut driver = Driver::open();
-    for (view, name, reason) in [
-        ("Train", "Report, HTML", "Nothing is trained yet: press Train first."),
-        (
-            "Experiments",
-            "Copy table as LaTeX",
-            "No trial has finished yet: press Run first.",
-        ),
-        (
-            "Compare",
-            "A: ONNX, f64",
-            "No run is chosen as A: choose one in the list.",
-        ),
-        (
-            "Trade-off",
-            "All points, CSV",
-            "No point is measured yet: press Measure first.",
-        ),
+    for (view, line, reason) in [
+        ("Train", "Report…", "Nothing is trained yet: press Train first."),
+        ("Study", "Data…", "Nothing has finished yet: press Run first."),
+        ("Compare", "Network…", "No run is chosen as A: choose one in the list."),
     ] {
         driver.click_button(view);
         driver.settle();
         driver.open_menu();
-        assert!(!driver.is_enabled(name), "{view}");
+        assert!(!driver.is_enabled(line), "{view}");
         assert!(driver.has(reason), "{view}: {:#?}", driver.texts());
         driver.press(Key::Escape);
         assert!(!driver.has(reason), "{view}: the menu is closed");
@@ -318,10 +302,7 @@ fn a_report_contains_the_displayed_errors_and_a_kept_run_is_exported_too() {
     }
     driver.click_button("Compare");
     let name = driver.state().runs.workspace.runs[0].name.clone();
-    driver.wait("the run", |driver| {
-        let compared = &driver.views().compare.places[0].compared;
-        driver.state().runs.pinned(0).is_some() && compared.is_some()
-    });
+    driver.wait("the run", |driver| driver.has("Surface of A"));
     let [network, of_kept] = ["network.json", "kept.html"].map(|name| folder.path().join(name));
     driver.save("A: Network file, JSON", &network);
     driver.click("Dismiss");
@@ -333,15 +314,14 @@ fn a_report_contains_the_displayed_errors_and_a_kept_run_is_exported_too() {
 #[test]
 fn export_names_its_network_and_offers_the_displayed_epoch() {
     let folder = tempfile::tempdir().unwrap();
-    let [past, best, errors] = ["past.json", "best.json", "errors.csv"].map(|name| folder.path().join(name));
+    let [past, of_best, errors] = ["past.json", "best.json", "errors.csv"].map(|name| folder.path().join(name));
     let mut driver = trained_driver();
     driver.wait_for_last_epoch();
-    driver.open_menu();
-    let best_epoch = trained(small()).leader().best_epoch();
-    let heading = format!("BEST NETWORK, EPOCH {best_epoch}");
+    let best = format!("Best network, epoch {}", trained(small()).leader().best_epoch());
+    driver.choose_export("ONNX, f64");
     assert!(
-        driver.has(&heading) && !driver.says("DISPLAYED NETWORK"),
-        "{:#?}",
+        !driver.says("Displayed network"),
+        "there is only one: {:#?}",
         driver.texts()
     );
     driver.press(Key::Escape);
@@ -354,15 +334,20 @@ fn export_names_its_network_and_offers_the_displayed_epoch() {
     driver.wait("the network of the epoch", |driver| {
         driver.says("Of the network of epoch 4.")
     });
-    driver.open_menu();
-    assert!(
-        driver.has("DISPLAYED NETWORK, EPOCH 4") && driver.has(&heading),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.choose_export("ONNX, f64");
+    assert!(driver.says("Displayed network, epoch 4"), "{:#?}", driver.texts());
+    driver.choose_in_dialog("Network", &best);
+    assert!(driver.says(&best), "{:#?}", driver.texts());
+    driver.press(Key::Escape);
     driver.save("Network file of epoch 4, JSON", &past);
     driver.click("Dismiss");
-    driver.save(NETWORK, &best);
+    driver.choose_export(NETWORK);
+    driver.choose_in_dialog("Network", &best);
+    driver.click_button("Save…");
+    driver.harness().run_steps(5);
+    driver.type_into("File", &of_best.display().to_string());
+    driver.click_button("Save");
+    driver.wait("the file", |driver| driver.says("Saved "));
     driver.click("Dismiss");
     driver.save(ERRORS, &errors);
 
@@ -376,7 +361,7 @@ fn export_names_its_network_and_offers_the_displayed_epoch() {
     assert_eq!(file.training.history, stopped.leader().history());
     assert_eq!(file.training.stages, stopped.leader().stages());
     assert_eq!(file.settings, small());
-    assert_eq!(NetworkFile::load(&best).unwrap().network, trained(small()).network());
+    assert_eq!(NetworkFile::load(&of_best).unwrap().network, trained(small()).network());
     let table = fs::read_to_string(&errors).unwrap();
     let z_percent = file.scores.network.percent().unwrap().to_string();
     assert!(

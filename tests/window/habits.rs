@@ -54,13 +54,13 @@ fn the_list_finds_an_action_by_a_few_letters_and_runs_it() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.type_into("Action", "show");
-    assert!(driver.has("Show Compare") && driver.has("Show Trade-off"));
+    assert!(driver.has("Show Compare") && driver.has("Show Sensor"));
     driver.type_into("Action", "comp");
-    assert!(driver.has("Show Compare") && !driver.has("Show Trade-off"));
+    assert!(driver.has("Show Compare") && !driver.has("Show Sensor"));
     driver.press(Key::Enter);
     driver.settle();
     assert_eq!(driver.shown(), "Compare");
-    assert!(!driver.has("Show Experiments"), "the list is closed");
+    assert!(!driver.has("Show Study"), "the list is closed");
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn an_arrow_selects_the_next_action_and_escape_closes_the_list() {
     driver.press(Key::ArrowDown);
     driver.press(Key::Enter);
     driver.settle();
-    assert_eq!(driver.shown(), "Compare", "the second, after Experiments");
+    assert_eq!(driver.shown(), "Compare", "the second, after Study");
 }
 
 #[test]
@@ -92,11 +92,11 @@ fn while_the_list_is_open_other_keys_do_nothing() {
 fn every_listed_key_works() {
     let mut driver = Driver::open();
     driver.press(Key::Questionmark);
-    assert!(driver.says("Ctrl+K") && driver.says("Next test snapshot") && driver.says("PageDown"));
+    assert!(driver.says("Ctrl+K") && driver.says("Next test sample") && driver.says("PageDown"));
     driver.press(Key::Escape);
     assert!(!driver.says("PageDown"));
     driver.press_with(Modifiers::COMMAND, Key::Num2);
-    assert_eq!(driver.shown(), "Experiments");
+    assert_eq!(driver.shown(), "Study");
 }
 
 #[test]

@@ -33,7 +33,7 @@ fn set_missing(driver: &mut Driver, text: &str) {
 
 /// Picks an option of the layout of text.
 fn set_layout(driver: &mut Driver, field: &str, option: &str) {
-    driver.unfold_to("Layout of text", field);
+    driver.unfold_to("File format", field);
     driver.click(field);
     driver.click_button(option);
     driver.wait("the files", |driver| !driver.says("Reading "));
@@ -71,7 +71,6 @@ fn the_limit_of_a_join_and_units_survive_other_files_missing_cells_and_layouts()
     driver.settle();
     assert_eq!(meaning(&driver, "states.c3").as_deref(), Some("unused"));
     driver.click("Joined files");
-    driver.click("Own limit for states.csv");
     driver.enter("Limit", "0.0045");
     driver.wait("the limit", |driver| driver.says("within 0.00450"));
 

@@ -85,8 +85,7 @@ fn from_the_first_start_a_dropped_file_is_an_onnx_network_after_three_clicks() {
     assert!(driver.state().recording.is_auto);
     driver.click("▶ Train");
     driver.wait_for_training();
-    driver.click_button("Export");
-    driver.click_button("ONNX, f32");
+    driver.export("ONNX, f32");
     let onnx = folder.path().join("network");
     driver.type_into("File", &onnx.display().to_string());
     driver.click_button("Save");
@@ -178,7 +177,7 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     without.settle();
     assert_eq!(without.state().settings().hidden, 4);
     assert!(without.state().setup().unwrap_err().contains("press.csv is missing"));
-    type_path(&mut without, "Type the path of press.csv", &moved);
+    type_path(&mut without, "Find press.csv", &moved);
     without.wait("the samples", |driver| driver.has("Training: 48"));
     assert!(!without.says("is missing") && !without.says("has changed since"));
     assert_eq!(without.state().setup().unwrap().plan().unwrap().import.data, moved);
@@ -198,7 +197,7 @@ fn a_changed_recording_is_reported() {
     let mut other = Driver::open();
     other.drop_files(&[&network]);
     other.wait("what is missing", |driver| driver.has("press.csv is missing."));
-    type_path(&mut other, "Type the path of press.csv", &changed);
+    type_path(&mut other, "Find press.csv", &changed);
     other.wait("the samples", |driver| driver.has("Training: 40"));
     assert!(other.has("changed.csv has changed since the run was saved."));
 
@@ -206,14 +205,14 @@ fn a_changed_recording_is_reported() {
     let mut resumed = Driver::open();
     resumed.drop_files(&[&checkpoint]);
     resumed.wait("what is missing", |driver| driver.has("press.csv is missing."));
-    type_path(&mut resumed, "Type the path of press.csv", &changed);
+    type_path(&mut resumed, "Find press.csv", &changed);
     resumed.wait("the reason", |driver| {
         driver.says("changed.csv has changed since the training was saved")
     });
     assert!(resumed.has("press.csv is missing.") && resumed.state().run.is_none());
     // With the right file, which is elsewhere, it continues where it stopped.
     let found = written(&folder, "found.csv", &recording(60));
-    type_path(&mut resumed, "Type the path of press.csv", &found);
+    type_path(&mut resumed, "Find press.csv", &found);
     resumed.wait("the training", |driver| driver.state().result().is_some());
     resumed.settle();
     assert_eq!(resumed.state().result().unwrap().epochs_run, 2);
@@ -237,7 +236,7 @@ fn a_checkpoint_continues_as_if_it_had_never_stopped() {
     other.settle();
     assert!(!other.has("Meaning of u1"), "the results are displayed");
     other.limit_epochs("2");
-    other.click_button("Continue");
+    other.click_button("Train longer");
     other.wait("the end", |driver| {
         let result = driver.state().result();
         result.is_some_and(|result| result.is_idle && result.epochs_run == 5)
@@ -469,7 +468,7 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
         driver.has("Training: 3") && driver.says("v is missing")
     });
     // The columns are read and the samples counted by different threads.
-    driver.wait("the missing cell", |driver| driver.has("Missing in v: 1"));
+    driver.wait("the missing cell", |driver| driver.has("v, missing: 1"));
 }
 
 #[test]

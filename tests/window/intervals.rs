@@ -47,7 +47,7 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
 
     // Another epoch makes them invalid; they are calibrated again at its end.
     driver.limit_epochs("1");
-    driver.click_button("Continue");
+    driver.click_button("Train longer");
     driver.wait("the second end", |driver| {
         let result = driver.state().result();
         result.is_some_and(|result| result.is_idle && result.epochs_run == 11)

@@ -83,7 +83,7 @@ fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
     driver.wait_for_epochs(1);
     assert!(!close(&mut driver), "it is not saved elsewhere");
     driver.harness().step();
-    driver.click_button("Stay");
+    driver.click_button("Cancel");
     driver.click("■ Stop");
     driver.wait("the end", |driver| {
         driver.state().phase == Phase::Ended(StopReason::Stopped) && checkpoints(folder).is_empty()
@@ -136,7 +136,7 @@ fn a_training_that_is_discarded_at_closing_is_not_offered() {
     let mut driver = training_in(folder);
     assert!(!close(&mut driver));
     driver.harness().step();
-    driver.click_button("Discard and close");
+    driver.click_button("Close");
     assert!(close(&mut driver));
     drop(driver);
     assert!(nothing_is_offered_in(folder));

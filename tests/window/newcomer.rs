@@ -1,6 +1,4 @@
-//! The first minute: the initial scene, the tour, the glossary, and empty views that fill on a click.
-
-use std::path::PathBuf;
+//! The first minute: the initial scene, the glossary, and empty views that fill on a click.
 
 use decoupler::window::Phase;
 use decoupler_core::{
@@ -10,17 +8,10 @@ use decoupler_core::{
 use decoupler_files::export::format_number;
 use eframe::egui::{Key, vec2};
 
-use crate::driver::{Driver, SKIP};
+use crate::driver::Driver;
 
 fn open_first() -> Driver {
     Driver::open_first(vec2(1440.0, 900.0))
-}
-
-/// Returns a file that does not exist yet, in a temporary folder.
-fn file() -> (tempfile::TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("window.json");
-    (folder, path)
 }
 
 /// Asserts that the displayed table contains the baselines computed by the library for `settings`.
@@ -52,7 +43,16 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     shows_the_baselines_of(&driver, opened);
     assert!(!driver.has("Published"), "the paper has no print");
     // A print: most of the surface is at rest, and the middle of it is pressed.
-    let depths_mm = driver.views().train.drawn.frames.actual.nodes_mm.iter();
+    let depths_mm = driver
+        .views()
+        .train
+        .drawn
+        .surfaces
+        .as_ref()
+        .unwrap()
+        .actual
+        .nodes
+        .iter();
     let depths_mm: Vec<f64> = depths_mm.map(|node| 5.0 - node.z).collect();
     let at_rest = depths_mm.iter().filter(|depth_mm| **depth_mm < 0.01).count();
     let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
@@ -126,60 +126,6 @@ fn a_linear_map_that_beats_the_network_is_marked() {
 }
 
 #[test]
-fn the_tour_leads_through_five_steps_and_is_remembered() {
-    let (_folder, path) = file();
-    let mut driver = Driver::open_on_tour(&path);
-    assert!(driver.says("step 1 of 5: Press the sensor") && driver.has("1 of 5"));
-    driver.click("Do it: Press the middle of the surface");
-    driver.wait("the answer", |driver| driver.says("Network, mean mm: "));
-    for step in 2..=5 {
-        driver.click_button("Next");
-        assert!(driver.says(&format!("step {step} of 5")), "{:#?}", driver.texts());
-    }
-    driver.click_button("Back");
-    assert!(driver.says("step 4 of 5"));
-    driver.click_button("Next");
-    driver.click_button("Done");
-    assert!(!driver.says("Tour, step"));
-    assert!(driver.becomes_idle());
-    drop(driver);
-    let mut driver = Driver::open_on_tour(&path);
-    assert!(!driver.has(SKIP), "it has ended for good");
-
-    // Until it is asked for again.
-    driver.press(Key::Questionmark);
-    driver.click_button("Take the tour");
-    assert!(driver.says("step 1 of 5"));
-    driver.click_button(SKIP);
-    assert!(!driver.says("step 1 of 5"));
-}
-
-#[test]
-fn the_tour_can_be_skipped_and_stays_away() {
-    let (_folder, path) = file();
-    let mut driver = Driver::open_on_tour(&path);
-    driver.click(SKIP);
-    drop(driver);
-    assert!(!Driver::open_on_tour(&path).has(SKIP));
-}
-
-#[test]
-fn the_tour_trains_on_a_click_and_stays_hidden_in_other_views() {
-    let (_folder, path) = file();
-    let mut driver = Driver::open_on_tour(&path);
-    driver.click_button("Next");
-    driver.click_button("Next");
-    driver.click_button("Compare");
-    assert!(!driver.has(SKIP), "it is about the Train view");
-    driver.click_button("Train");
-    driver.settle();
-    driver.click("Do it: Train");
-    driver.wait("the training", |driver| driver.epochs() > 2);
-    driver.click("■ Stop");
-    driver.wait("its end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
-}
-
-#[test]
 fn every_term_has_the_same_text_in_the_glossary_and_as_a_tooltip() {
     let mut driver = open_first();
     driver.wait("the baselines", |driver| !driver.table().is_empty());
@@ -224,6 +170,14 @@ fn about_has_the_version_and_the_licences_of_all_libraries() {
 }
 
 #[test]
+fn the_list_of_actions_finds_train_by_other_words() {
+    let mut driver = open_first();
+    driver.act("start training");
+    driver.wait("the training", |driver| driver.state().phase.is_busy());
+    driver.act("Stop training");
+}
+
+#[test]
 fn the_list_of_actions_finds_terms_too() {
     let mut driver = open_first();
     driver.act("pareto");
@@ -240,10 +194,11 @@ fn empty_views_fill_on_a_click() {
     driver.configure_small();
     driver.click_button("Compare");
     assert!(driver.is_enabled("Train a network now"));
-    driver.click_button("Experiments");
+    driver.click_button("Study");
     driver.settle();
     assert!(driver.is_enabled("Run now"));
-    driver.click_button("Trade-off");
+    driver.click("Speed against accuracy");
+    driver.settle();
     assert!(driver.is_enabled("Measure now"));
     driver.click_button("Train");
     driver.settle();
@@ -251,11 +206,10 @@ fn empty_views_fill_on_a_click() {
     driver.wait("the end of the training", |driver| {
         matches!(driver.state().phase, Phase::Ended(_))
     });
-    driver.click_button("Experiments");
+    driver.click_button("Study");
+    driver.click("Table 1");
     driver.click_button("Run now");
-    driver.wait("the experiment", |driver| {
-        driver.state().working.contains(&"Experiments")
-    });
+    driver.wait("the experiment", |driver| driver.is_enabled("■ Cancel"));
     driver.click("■ Cancel");
 }
 

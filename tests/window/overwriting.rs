@@ -122,7 +122,7 @@ fn typing_replaces_the_suggested_path() {
     driver.click("Dismiss");
 
     // So do the forms for files that are read.
-    driver.open_form("Type the path of a recording");
+    driver.open_form("Add file…");
     driver.settle();
     driver.harness().event(Event::Text(path.display().to_string()));
     driver.settle();

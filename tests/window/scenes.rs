@@ -1,5 +1,6 @@
 //! Scenes, inputs and presets in the window, and files written before there were scenes.
 
+use decoupler::window::Effect;
 use decoupler_core::{
     dataset::Simulation,
     evaluation::{Outlook, Preset, RunSettings},
@@ -43,7 +44,7 @@ fn known_rows_train_one_small_network_for_each_row() {
     assert_eq!(run.network().values().len(), 10);
     assert_eq!(driver.state().run.as_ref().unwrap().weights, 1560);
     assert_eq!(driver.table(), table_of(&run));
-    assert!(driver.has("Decoupled surface"));
+    assert!(driver.has("Decoded surface"));
     driver.settle();
 }
 
@@ -56,7 +57,10 @@ fn with_one_row_only_that_row_is_drawn() {
     assert_eq!(driver.state().draft.simulation().unwrap().scene.rows, Rows::One(3));
     assert!(driver.has("6 unknowns, 18 equations per frame"));
     wait_for_scene(&mut driver);
-    assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 6);
+    assert_eq!(
+        driver.views().train.drawn.surfaces.as_ref().unwrap().actual.nodes.len(),
+        6
+    );
     assert!(driver.says("1 of 100"), "a snapshot is one sample");
     driver.train();
     let mut settings = small();
@@ -69,7 +73,7 @@ fn with_one_row_only_that_row_is_drawn() {
     }
     driver.click_button("Top view");
     driver.settle();
-    assert!(driver.has("Decoupled surface"));
+    assert!(driver.has("Decoded surface"));
 
     // A smaller array has a last row too.
     driver.enter("Array scale", "2x3_2x9");
@@ -187,7 +191,7 @@ fn only_the_settings_of_the_current_choices_are_shown() {
         driver.state().draft.simulation().unwrap().scene.loading,
         Loading::Indenter(Indenter::default())
     );
-    driver.choose("Shape", "Cylinder");
+    driver.choose("Shape", "Flat punch");
     shows(
         &driver,
         &["Shape", "Radius from", "Radius to", "Largest tilt", "Spread"],
@@ -198,13 +202,11 @@ fn only_the_settings_of_the_current_choices_are_shown() {
         panic!("{:?}", driver.state().draft.simulation().unwrap().scene)
     };
     let (smallest, largest) = (8.0, 8.0);
-    let cylinder = IndenterShape::Cylinder(TiltedBody {
+    let punch = IndenterShape::FlatPunch(TiltedBody {
         radius_mm: Radii { smallest, largest },
         largest_tilt_degrees: 12.0,
     });
-    assert_eq!(indenter.shape, cylinder, "the largest radius follows the smallest");
-    driver.choose("Shape", "Edge");
-    shows(&driver, &["Shape", "Largest tilt", "Spread"]);
+    assert_eq!(indenter.shape, punch, "the largest radius follows the smallest");
     driver.choose("Loading", "Random nodes");
     driver.click_button("One");
     driver.click_button("x, y, z");
@@ -214,6 +216,28 @@ fn only_the_settings_of_the_current_choices_are_shown() {
     assert_eq!(driver.state().draft, RunSettings::default());
     wait_for_scene(&mut driver);
     driver.settle();
+}
+
+#[test]
+fn a_shape_from_a_file_that_is_not_offered_is_shown_and_kept() {
+    let mut driver = Driver::open();
+    let mut settings = RunSettings::default();
+    let [_, _, _, edge] = Indenter::all();
+    settings.simulation_mut().unwrap().scene.loading = Loading::Indenter(edge);
+    driver.window_mut().apply(Effect::Configure(Box::new(settings)));
+    wait_for_scene(&mut driver);
+    assert_eq!(driver.get("Shape").value().as_deref(), Some("Edge"));
+    driver.enter("Largest tilt", "12");
+    let Loading::Indenter(indenter) = driver.state().draft.simulation().unwrap().scene.loading else {
+        panic!("{:?}", driver.state().draft)
+    };
+    let largest_tilt_degrees = 12.0;
+    assert_eq!(indenter.shape, IndenterShape::Edge { largest_tilt_degrees });
+    driver.choose("Shape", "Sphere");
+    let edges = |driver: &Driver| driver.texts().iter().filter(|text| *text == "Edge").count();
+    let elsewhere = edges(&driver);
+    driver.click("Shape");
+    assert_eq!(edges(&driver), elsewhere, "it is not offered");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Past epochs selected with the slider under the loss curves.
+//! Past epochs selected with the slider under the charts.
 
 use eframe::egui::Key;
 
@@ -57,28 +57,32 @@ fn the_network_of_an_epoch_equals_that_of_a_training_stopped_there() {
 }
 
 #[test]
-fn a_replay_goes_through_the_epochs_and_ends_on_the_latest() {
+fn a_replay_goes_through_the_epochs_on_every_chart_and_ends_on_the_latest() {
     for source in BOTH {
         let Opened {
             mut driver,
             setup,
             folder: _folder,
         } = trained_small(source);
-        driver.click_button("Replay the training");
-        assert!(driver.views().train.scrub.is_replaying());
-        let mut seen = Vec::new();
-        for _ in 0..200 {
-            if !driver.views().train.scrub.is_replaying() {
-                break;
-            }
-            seen.extend(driver.views().train.scrub.epoch());
-            driver.harness().step();
-        }
-        seen.dedup();
-        assert!(seen.is_sorted() && seen.len() > 4, "{source:?}: {seen:?}");
         let last = driver.epochs();
-        driver.wait("the end", |driver| driver.has(&format!("Latest, epoch {last}")));
-        driver.settle();
+        for chart in ["Loss", "Training state", "Histogram", "Regression"] {
+            driver.click(chart);
+            driver.settle();
+            driver.click_button("Replay the training");
+            assert!(driver.has("Stop the replay"), "{source:?}, {chart}");
+            let mut seen = Vec::new();
+            for _ in 0..200 {
+                if driver.has("Replay the training") {
+                    break;
+                }
+                seen.extend(driver.views().train.scrub.epoch());
+                driver.harness().step();
+            }
+            seen.dedup();
+            assert!(seen.is_sorted() && seen.len() > 4, "{source:?}, {chart}: {seen:?}");
+            driver.wait("the end", |driver| driver.has(&format!("Latest, epoch {last}")));
+            driver.settle();
+        }
         driver.assert_shows(&network_figures(&run_of(&setup)));
         assert!(driver.becomes_idle(), "{source:?}: nothing moves any more");
     }

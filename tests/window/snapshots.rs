@@ -98,8 +98,8 @@ fn train_view_before_and_after_a_training() {
 }
 
 #[test]
-fn experiments_view() {
-    looks_as_before(&mut open_view("Experiments"), "experiments");
+fn study_view() {
+    looks_as_before(&mut open_view("Study"), "study");
 }
 
 #[test]
@@ -119,16 +119,11 @@ fn compare_view_with_two_runs() {
 }
 
 #[test]
-fn identifiability_view() {
-    let mut driver = open_view("Identifiability");
+fn sensor_view() {
+    let mut driver = open_view("Sensor");
     driver.wait("the answer", |driver| driver.says("Condition number: "));
     driver.settle();
-    looks_as_before(&mut driver, "identifiability");
-}
-
-#[test]
-fn trade_off_view() {
-    looks_as_before(&mut open_view("Trade-off"), "trade-off");
+    looks_as_before(&mut driver, "sensor");
 }
 
 #[test]

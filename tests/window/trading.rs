@@ -1,29 +1,37 @@
-//! The Trade-off view: measured, queried, loaded, cancelled and exported.
+//! Speed against accuracy: measured, queried, opened, cancelled and exported.
 
 use std::{fs, path::Path};
 
-use decoupler::window::{PlannedLevel, SourceKind, TradeOffEnding, TradeOffPlan};
+use decoupler::window::SourceKind;
 use decoupler_core::{
-    evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under},
+    dataset::Simulation,
+    decoupling::{DecoderKind, Precision},
+    evaluation::{Preset, RunSettings, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under},
     job::Job,
+    scene::{Noise, Scene},
 };
-use decoupler_files::export::format_percent;
+use decoupler_files::{export::format_percent, figure::point_name, import::Setup};
 use eframe::egui::vec2;
 
 use crate::{
     driver::Driver,
+    experiments::wait_for_the_end,
     sources::{Opened, open_small},
 };
+
+const TOPIC: &str = "Speed against accuracy";
+const OPEN: &str = "Open in Train view";
 
 fn open() -> Driver {
     let mut driver = Driver::open();
     driver.click("10×6");
-    driver.click_button("Trade-off");
+    driver.click_button("Study");
+    driver.click(TOPIC);
     driver
 }
 
 /// Ridge, Newton and small networks of both presets at two levels of noise.
-pub(crate) fn tiny(driver: &mut Driver) -> TradeOffPlan {
+pub(crate) fn tiny(driver: &mut Driver) {
     driver.type_into("Noise levels", "0, 1e-3");
     driver.type_into("Hidden nodes", "3");
     for decoder in ["Training mean", "Radial basis", "Fuzzy rules", "Network + Newton"] {
@@ -33,145 +41,156 @@ pub(crate) fn tiny(driver: &mut Driver) -> TradeOffPlan {
     driver.enter("Maximum epochs", "3");
     driver.enter("Test samples", "20");
     assert!(driver.has("16 points"), "{:#?}", driver.texts());
-    driver.views().trade_off.plan(driver.state()).unwrap()
 }
 
 pub(crate) fn measure(driver: &mut Driver) {
     driver.click("▶ Measure");
-    driver.wait("the end of the measurement", |driver| {
-        driver.views().trade_off.running.is_none()
-    });
+    wait_for_the_end(driver);
 }
 
-/// Returns the points measured by the library.
-fn by_library(plan: &TradeOffPlan, level: &PlannedLevel) -> Vec<TradeOffPoint> {
-    let mut points = Vec::new();
-    for run in &level.runs {
-        let on_point = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| points.push(point.unwrap());
-        let sets = run.setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
-        let settings = run.setup.settings();
-        measure_trade_off(
-            settings,
-            &sets.sets,
-            &plan.hidden,
-            &run.decoders,
-            &Job::UNINTERRUPTED,
-            on_point,
-        )
-        .unwrap();
+/// The settings of a preset at a noise, with the numbers of [`tiny`], in the scene of `draft`.
+fn settings(draft: &RunSettings, preset: Preset, noise: f64) -> RunSettings {
+    let array = draft.simulation().unwrap();
+    let noise = Noise {
+        relative: noise,
+        ..array.scene.noise
+    };
+    let of_preset = preset.simulation_in(noise);
+    let mut settings = preset.settings_in(noise);
+    settings.training.stopping.epochs = 3;
+    settings.seed = draft.seed;
+    settings.source = Simulation {
+        sensor: array.sensor,
+        scene: Scene {
+            rows: of_preset.scene.rows,
+            noise,
+            ..array.scene
+        },
+        samples: 100,
+        validation_samples: of_preset.validation_samples.min(20),
+        test_samples: 20,
     }
+    .into();
+    settings
+}
+
+/// Returns the points of a setup measured by the library.
+fn by_library(setup: &Setup, preset: Option<Preset>, decoders: &[DecoderKind]) -> Vec<TradeOffPoint> {
+    let mut points = Vec::new();
+    let on_point = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| {
+        points.push(TradeOffPoint {
+            preset,
+            ..point.unwrap()
+        });
+    };
+    let sets = setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
+    measure_trade_off(
+        setup.settings(),
+        &sets.sets,
+        &[3],
+        decoders,
+        &Job::UNINTERRUPTED,
+        on_point,
+    )
+    .unwrap();
     points
+}
+
+const TINY: [DecoderKind; 3] = [DecoderKind::Ridge, DecoderKind::Network, DecoderKind::Newton];
+
+/// The text of the answer to a question.
+fn answer(driver: &Driver, question: &str) -> String {
+    let texts = driver.texts().into_iter();
+    let mut answers = texts.filter(|text| text.starts_with(&format!("{question}: ")));
+    answers.next().unwrap_or_else(|| panic!("{:#?}", driver.texts()))
 }
 
 #[test]
 fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
+    let folder = tempfile::tempdir().unwrap();
     let mut driver = open();
-    let plan = tiny(&mut driver);
+    tiny(&mut driver);
     measure(&mut driver);
-    let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
-    assert_eq!(
-        (outcome.points(), outcome.ending),
-        ((16, 16), Some(TradeOffEnding::Complete))
+    assert!(
+        driver.says("Speed against accuracy finished: 16 points in "),
+        "{:#?}",
+        driver.texts()
     );
-    for (level, planned) in outcome.levels.iter().zip(&plan.levels) {
-        for (shown, own) in level.points.iter().zip(by_library(&plan, planned)) {
-            assert_eq!(
-                (shown.report.kind, shown.report.precision),
-                (own.report.kind, own.report.precision)
-            );
-            assert_eq!(shown.report.errors, own.report.errors, "times differ, errors do not");
-            assert_eq!(shown.settings, own.settings);
+    let table = folder.path().join("points.csv");
+    driver.save("All points, CSV", &table);
+    driver.click("Dismiss");
+    let table = fs::read_to_string(table).unwrap();
+    let mut lines = table.lines().skip(1);
+    let draft = driver.state().draft;
+    for noise in [0.0, 1e-3] {
+        for preset in Preset::ALL {
+            let setup = settings(&draft, preset, noise).into();
+            for own in by_library(&setup, Some(preset), &TINY) {
+                let precision = match own.report.precision {
+                    Precision::Double => "f64",
+                    Precision::Single => "f32",
+                };
+                let line = lines.next().unwrap();
+                let start = format!("{noise:?},{preset},{},{precision},", own.report.kind);
+                assert!(line.starts_with(&start), "{start}: {line}");
+                let z = own.report.errors.percent().unwrap();
+                assert!(
+                    line.contains(&format!(",{z:?},")),
+                    "times differ, errors do not: {z:?}: {line}"
+                );
+            }
         }
     }
+    assert_eq!(lines.next(), None);
     for name in [
         "Ridge, paper preset",
         "Newton, best preset",
         "Network f32, best preset, 3 hidden",
     ] {
         for chart in ["Decoding", "Training"] {
-            assert!(
-                driver.has(&format!("{chart}: {name}")),
-                "{name} in {chart}: {:#?}",
-                driver.texts()
-            );
+            let point = format!("{chart}: {name}");
+            assert!(driver.has(&point), "{point}: {:#?}", driver.texts());
         }
     }
-    driver.click_button("1e-3");
-    assert_eq!(driver.views().trade_off.look.level, 1);
-    driver.settle();
 
-    driver.enter("Fastest under", "5");
+    driver.click_button("0.001");
+    driver.settle();
+    driver.enter("Fastest under", "1e9");
     driver.enter("Most accurate under", "1e9");
-    let level = driver.views().trade_off.shown().unwrap();
-    let fastest = level.points[fastest_under(&level.points, 5.0).unwrap()].clone();
-    let best = level.points[most_accurate_under(&level.points, 1e9).unwrap()].clone();
-    let is_best = format_percent(best.report.errors.percent());
-    let answer = driver
-        .texts()
-        .into_iter()
-        .find(|text| text.starts_with("Most accurate: "))
-        .unwrap();
-    assert!(answer.contains(&is_best), "{answer}");
-    let answer = driver
-        .texts()
-        .into_iter()
-        .find(|text| text.starts_with("Fastest: "))
-        .unwrap();
-    driver.click(&answer);
-    let marked = driver.views().trade_off.look.marked.unwrap();
-    assert_eq!(driver.views().trade_off.shown().unwrap().points[marked], fastest);
+    let points = Preset::ALL.into_iter().flat_map(|preset| {
+        let setup = settings(&draft, preset, 1e-3).into();
+        by_library(&setup, Some(preset), &TINY)
+    });
+    let points = Vec::from_iter(points);
+    let best = &points[most_accurate_under(&points, 1e9).unwrap()];
+    let text = answer(&driver, "Most accurate");
+    let percent = format_percent(best.report.errors.percent());
+    assert!(text.contains(&point_name(best)) && text.contains(&percent), "{text}");
+    assert!(fastest_under(&points, 1e9).is_some());
+    assert!(!driver.is_enabled(OPEN), "nothing is marked");
+    driver.click(&text);
     driver.enter("Fastest under", "1e-12");
     assert!(driver.has("No measured decoder is this accurate."));
-
-    driver.click("Load into Train view");
-    assert_eq!((driver.shown(), driver.state().draft), ("Train", fastest.settings));
+    driver.click(OPEN);
+    assert_eq!((driver.shown(), driver.state().draft), ("Train", best.settings));
 }
 
 #[test]
-fn a_click_on_a_point_loads_its_configuration() {
+fn a_click_on_a_point_opens_its_configuration() {
     let mut driver = open();
-    let plan = tiny(&mut driver);
+    tiny(&mut driver);
     measure(&mut driver);
+    let before = driver.state().draft;
+    driver.click("Point Newton, paper preset");
+    assert!(driver.has("MARKED POINT"), "a row of the table marks its point");
+    assert_eq!(driver.shown(), "Study");
     driver.click("Decoding: Ridge, best preset");
     assert_eq!(driver.shown(), "Train");
-    let mut runs = plan.levels[0].runs.iter();
-    let best = runs.find(|run| run.preset == Some(Preset::Best)).unwrap();
-    let ridge = *best.setup.settings();
-    let draft = driver.state().draft;
-    assert_eq!(
-        (
-            draft.simulation().unwrap().scene,
-            draft.inputs,
-            draft.simulation().unwrap().samples
-        ),
-        (
-            ridge.simulation().unwrap().scene,
-            ridge.inputs,
-            ridge.simulation().unwrap().samples
-        )
-    );
-    driver.click_button("Trade-off");
-    let (marked, level) = (
-        driver.views().trade_off.look.marked.unwrap(),
-        driver.views().trade_off.shown().unwrap(),
-    );
-    assert_eq!(level.points[marked].preset, Some(Preset::Best));
-    let row = driver
-        .texts()
-        .into_iter()
-        .find(|text| text.starts_with("Newton, paper preset: "))
-        .unwrap();
-    driver.click(&row);
-    assert_ne!(
-        driver.views().trade_off.look.marked,
-        Some(marked),
-        "a row of the table marks its point"
-    );
-    assert_eq!(driver.shown(), "Trade-off");
+    assert_eq!(driver.state().draft, settings(&before, Preset::Best, 0.0));
 }
 
 #[test]
-fn measurements_are_saved_as_table_and_figures() {
+fn measurements_are_saved_as_tables_and_figures() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open();
     tiny(&mut driver);
@@ -179,8 +198,9 @@ fn measurements_are_saved_as_table_and_figures() {
     measure(&mut driver);
     let saved = [
         ("All points, CSV", "points.csv", &b"noise,preset,decoder"[..]),
-        ("Charts, SVG", "charts.svg", b"<svg"),
-        ("Charts, PNG", "charts.png", b"\x89PNG"),
+        ("Table, CSV", "table.csv", b"decoder,z_percent"),
+        ("Figure, SVG", "charts.svg", b"<svg"),
+        ("Figure, PNG", "charts.png", b"\x89PNG"),
     ];
     for (button, name, expected) in saved {
         let path = folder.path().join(name);
@@ -194,9 +214,6 @@ fn measurements_are_saved_as_table_and_figures() {
     let columns = |line: &str| line.split(',').count();
     let heading = columns(table.lines().next().unwrap());
     assert!(table.lines().all(|line| columns(line) == heading), "{table}");
-    let points = &driver.views().trade_off.outcome.as_ref().unwrap().levels[0].points;
-    let z = points[0].report.errors.percent().unwrap();
-    assert!(table.lines().nth(1).unwrap().contains(&format!(",{z:?},")), "{table}");
     let svg = fs::read_to_string(folder.path().join("charts.svg")).unwrap();
     for text in [
         ">Newton<",
@@ -220,26 +237,57 @@ fn a_measurement_shows_its_points_as_they_arrive_and_can_be_cancelled() {
     driver.enter("Maximum epochs", "200");
     driver.click("▶ Measure");
     driver.wait("the first points", |driver| {
-        let outcome = driver.views().trade_off.outcome.as_ref();
-        outcome.is_some_and(|outcome| outcome.points().0 >= 3)
+        driver.has("Decoding: Network, paper preset, 3 hidden")
     });
     assert!(driver.has("Decoding: Ridge, paper preset"));
     assert!(!driver.is_enabled("▶ Measure"), "one measurement at a time");
     driver.click("■ Cancel");
     assert!(
-        driver.views().trade_off.running.is_none(),
+        driver.is_enabled("▶ Measure"),
         "cancelling does not wait for the current point"
     );
-    let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
-    let (done, all) = outcome.points();
-    assert!((3..all).contains(&done), "{done} of {all}");
-    assert_eq!(outcome.ending, Some(TradeOffEnding::Cut));
-    assert!(driver.says(&format!("Ended early: {done} of {all} points")));
+    assert!(
+        driver.says("Speed against accuracy ended early: "),
+        "{:#?}",
+        driver.texts()
+    );
     // The next one begins when the processor is free, and shows only its own points.
     driver.type_into("Hidden nodes", "3");
     driver.enter("Maximum epochs", "3");
     measure(&mut driver);
-    assert_eq!(driver.views().trade_off.outcome.as_ref().unwrap().points(), (16, 16));
+    assert!(
+        driver.says("Speed against accuracy finished: 16 points in "),
+        "{:#?}",
+        driver.texts()
+    );
+}
+
+#[test]
+fn a_measurement_waits_while_a_training_would_distort_its_times() {
+    let mut opened = open_small(SourceKind::Array);
+    opened.change(|settings| settings.training.stopping.epochs = 1_000_000);
+    let mut driver = opened.driver;
+    driver.click_button("Study");
+    driver.click(TOPIC);
+    tiny(&mut driver);
+    driver.click_button("Train");
+    driver.click("▶ Train");
+    driver.click_button("Study");
+    driver.click("▶ Measure");
+    driver.wait("the note", |driver| driver.says("would distort the times"));
+    driver.harness().run_steps(20);
+    assert!(!driver.has("Decoding: Ridge, paper preset"), "nothing is measured");
+    driver.click_button("Train");
+    driver.click("■ Stop");
+    driver.settle();
+    driver.click_button("Study");
+    wait_for_the_end(&mut driver);
+    assert!(!driver.says("would distort the times"));
+    assert!(
+        driver.says("Speed against accuracy finished: 16 points in "),
+        "{:#?}",
+        driver.texts()
+    );
 }
 
 #[test]
@@ -250,7 +298,7 @@ fn an_invalid_plan_says_why() {
     assert!(!driver.is_enabled("▶ Measure"));
     driver.type_into("Noise levels", "0");
     driver.type_into("Hidden nodes", "0");
-    assert!(driver.says("Hidden nodes: 0 is not possible"), "{:#?}", driver.texts());
+    assert!(driver.says("hidden nodes: 0 is not possible"), "{:#?}", driver.texts());
     driver.type_into("Hidden nodes", "3");
     assert!(driver.is_enabled("▶ Measure"));
 }
@@ -259,7 +307,8 @@ fn an_invalid_plan_says_why() {
 fn charts_and_form_fit_in_a_narrow_window() {
     let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
     driver.click("10×6");
-    driver.click_button("Trade-off");
+    driver.click_button("Study");
+    driver.click(TOPIC);
     tiny(&mut driver);
     measure(&mut driver);
     driver.settle();
@@ -277,13 +326,14 @@ fn charts_and_form_fit_in_a_narrow_window() {
 }
 
 #[test]
-fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_loaded() {
+fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_opened() {
     let Opened {
         mut driver,
         setup,
         folder,
     } = open_small(SourceKind::Recording);
-    driver.click_button("Trade-off");
+    driver.click_button("Study");
+    driver.click(TOPIC);
     driver.type_into("Hidden nodes", "3");
     for decoder in ["Radial basis", "Fuzzy rules"] {
         driver.click(decoder);
@@ -296,29 +346,11 @@ fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_loaded() {
     );
     // Mean and ridge once, then a network in two precisions by each of two methods.
     assert!(driver.has("6 points"), "{:#?}", driver.texts());
-    let plan = driver.views().trade_off.plan(driver.state()).unwrap();
     measure(&mut driver);
-    let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
-    assert_eq!(
-        (outcome.points(), outcome.ending),
-        ((6, 6), Some(TradeOffEnding::Complete))
-    );
-    let own = by_library(&plan, &plan.levels[0]);
-    assert_eq!(own.len(), outcome.levels[0].points.len());
-    for (shown, own) in outcome.levels[0].points.iter().zip(own) {
-        assert_eq!(
-            (shown.report.kind, shown.report.precision),
-            (own.report.kind, own.report.precision)
-        );
-        assert_eq!(shown.report.errors, own.report.errors, "times differ, errors do not");
-        assert_eq!((shown.settings, shown.preset), (own.settings, None));
-    }
+    assert!(driver.says("finished: 6 points in "), "{:#?}", driver.texts());
     for name in ["Ridge", "Network, lm, 3 hidden", "Network f32, br, 3 hidden"] {
-        assert!(
-            driver.has(&format!("Decoding: {name}")),
-            "{name}: {:#?}",
-            driver.texts()
-        );
+        let point = format!("Decoding: {name}");
+        assert!(driver.has(&point), "{name}: {:#?}", driver.texts());
     }
     let table = folder.path().join("points.csv");
     driver.save("All points, CSV", &table);
@@ -330,6 +362,15 @@ fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_loaded() {
         "{table}"
     );
     assert_eq!(table.lines().count(), 1 + 6);
+    let own = by_library(&setup, None, &[DecoderKind::Mean, DecoderKind::Ridge]);
+    for (own, line) in own.iter().zip(table.lines().skip(1)) {
+        let percent = own.report.errors.percent().unwrap();
+        let start = format!("{},", own.report.kind);
+        assert!(
+            line.starts_with(&start) && line.contains(&format!(",{percent:?},")),
+            "{line}"
+        );
+    }
 
     driver.click("Decoding: Network, lm, 3 hidden");
     assert_eq!(driver.shown(), "Train");
@@ -338,15 +379,11 @@ fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_loaded() {
     assert_eq!(loaded.source, setup.settings().source);
 }
 
-/// Text of the first row of the table that begins with `name`.
-fn row(driver: &Driver, name: &str) -> String {
-    let texts = driver.texts().into_iter();
-    let mut rows = texts.filter(|text| text.starts_with(&format!("{name}: ")));
-    rows.next().unwrap()
-}
-
-/// Types the path of the file asked for, waits until it is written, and returns the metadata of the bundle.
-fn save(driver: &mut Driver, path: &Path) -> serde_json::Value {
+/// Exports the decoder of the marked point, waits until it is written, and returns the metadata of the bundle.
+fn save(driver: &mut Driver, format: &str, path: &Path) -> serde_json::Value {
+    driver.click("Export this decoder…");
+    driver.choose_in_dialog("Format", format);
+    driver.click_button("Save…");
     driver.harness().run_steps(5);
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
@@ -362,10 +399,15 @@ fn save(driver: &mut Driver, path: &Path) -> serde_json::Value {
 }
 
 #[test]
-fn the_decoder_of_a_point_is_exported_from_the_chart_and_from_the_table() {
+fn the_decoder_of_the_marked_point_is_exported() {
     for source in [SourceKind::Array, SourceKind::Recording] {
-        let Opened { mut driver, folder, .. } = open_small(source);
-        driver.click_button("Trade-off");
+        let Opened {
+            mut driver,
+            folder,
+            setup,
+        } = open_small(source);
+        driver.click_button("Study");
+        driver.click(TOPIC);
         if source == SourceKind::Array {
             driver.type_into("Noise levels", "1e-3");
             driver.enter("Maximum samples", "100");
@@ -375,17 +417,17 @@ fn the_decoder_of_a_point_is_exported_from_the_chart_and_from_the_table() {
         driver.enter("Maximum epochs", "3");
         measure(&mut driver);
         let (ridge, network) = match source {
-            SourceKind::Array => ("Ridge, paper preset", "Network, best preset, 3 hidden"),
-            SourceKind::Recording => ("Ridge", "Network, lm, 3 hidden"),
+            SourceKind::Array => ("Point Ridge, paper preset", "Point Network, best preset, 3 hidden"),
+            SourceKind::Recording => ("Point Ridge", "Point Network, lm, 3 hidden"),
         };
-        let marked = row(&driver, ridge);
-        driver.click(&marked);
-        driver.click("Export Ridge…");
-        driver.click_button("NumPy, f64");
-        let metadata = save(&mut driver, &folder.path().join("ridge"));
+        driver.click(ridge);
+        let metadata = save(&mut driver, "NumPy", &folder.path().join("ridge"));
         assert_eq!(metadata["decoder"], "ridge");
-        let look = driver.views().trade_off.look;
-        let point = &driver.views().trade_off.shown().unwrap().points[look.marked.unwrap()];
+        let of = match source {
+            SourceKind::Array => settings(setup.settings(), Preset::Paper, 1e-3).into(),
+            SourceKind::Recording => setup.clone(),
+        };
+        let point = &by_library(&of, None, &[DecoderKind::Ridge])[0];
         let errors = match source {
             SourceKind::Array => {
                 assert_eq!(metadata["seed"], point.settings.seed.0);
@@ -401,13 +443,11 @@ fn the_decoder_of_a_point_is_exported_from_the_chart_and_from_the_table() {
         };
         assert_eq!(metadata["errors"], errors, "the errors of the point");
 
-        driver.right_click(&format!("Decoding: {network}"));
-        driver.click_button("ONNX, f32");
-        let metadata = save(&mut driver, &folder.path().join("network"));
+        driver.click(network);
+        let metadata = save(&mut driver, "ONNX", &folder.path().join("network"));
         assert_eq!(
             (&metadata["decoder"], &metadata["hidden_nodes"]),
             (&"network".into(), &3.into())
         );
-        assert_eq!(driver.shown(), "Trade-off", "a right-click does not load the point");
     }
 }

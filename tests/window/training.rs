@@ -71,19 +71,19 @@ fn every_picture_of_a_trained_network_can_be_displayed() {
     }
     driver.configure_small();
     driver.train();
-    let heights = driver.get("Decoupled surface").value().unwrap();
+    let heights = driver.get("Decoded surface").value().unwrap();
     assert!(heights.starts_with("z ") && heights.ends_with(" mm"), "{heights}");
 
     driver.click_button("Error");
     let error = driver.get("Error surface").value().unwrap();
     assert!(error.starts_with("error ") && error.ends_with(" mm"), "{error}");
-    assert!(!driver.has("Decoupled surface"));
-    driver.click_button("Decoupled");
-    assert!(driver.has("Decoupled surface"));
+    assert!(!driver.has("Decoded surface"));
+    driver.click_button("Decoded");
+    assert!(driver.has("Decoded surface"));
 
     driver.click_button("Top view");
     assert_eq!(driver.state().look.mode, ViewMode::Top);
-    assert!(driver.has("Actual surface") && driver.has("Decoupled surface"));
+    assert!(driver.has("Actual surface") && driver.has("Decoded surface"));
     driver.click_button("3-D");
     assert_eq!(driver.state().look.mode, ViewMode::ThreeD);
 
@@ -163,14 +163,14 @@ fn a_paused_training_is_idle_and_resumes_as_if_it_had_never_been_paused() {
     driver.wait("the end", |driver| {
         driver.state().phase == Phase::Ended(StopReason::Stopped)
     });
-    assert!(driver.says("stopped by you"));
+    assert!(driver.says("Stopped at epoch"));
     let mut run = Run::prepare(endless()).unwrap();
     for _ in 0..driver.epochs() {
         run.step();
     }
     assert_eq!(driver.state().run.as_ref().unwrap().history, run.leader().history());
     assert_eq!(driver.table(), table_of(&run));
-    assert!(driver.has("Decoupled surface") && driver.is_enabled("Hidden nodes"));
+    assert!(driver.has("Decoded surface") && driver.is_enabled("Hidden nodes"));
     driver.settle();
 }
 
@@ -184,7 +184,7 @@ fn keys_pause_resume_and_stop_and_the_next_training_starts_again() {
     assert_eq!(driver.state().phase, Phase::Training);
     driver.press_with(Modifiers::COMMAND, Key::P);
     driver.press_with(Modifiers::COMMAND, Key::Period);
-    driver.wait("the end", |driver| driver.says("stopped by you"));
+    driver.wait("the end", |driver| driver.says("Stopped at epoch"));
 
     choose_method(&mut driver, "Levenberg-Marquardt");
     driver.enter("Epochs", "15");
@@ -209,7 +209,7 @@ fn stopping_a_training_being_prepared_takes_effect_at_once_and_the_previous_one_
         driver.window_mut().apply(Effect::Configure(Box::new(small())));
         driver.train();
         assert_eq!(driver.table(), table_of(&trained(small())));
-        assert!(!driver.says("stopped by you"));
+        assert!(!driver.says("Stopped at epoch"));
     }
 }
 
@@ -241,7 +241,9 @@ fn nodes_beyond_the_axes_are_reported_as_drawn_at_the_edge() {
     driver.train();
     let run = driver.state().run.as_ref().unwrap();
     let result = run.result.as_ref().unwrap();
-    let nodes = run.test.array().unwrap().frame(result.answers.view(), 0).nodes_mm;
+    let nodes = run.test.drawing(Some(&result.answers), 0).unwrap().decoded.unwrap()[0]
+        .nodes
+        .clone();
     // The best network is the untrained one before the first step.
     assert_eq!(result.best_epoch, 0);
     let (low, high) = (4.0 - 0.08, 5.0 + 0.08);

@@ -1,6 +1,5 @@
 //! Typing numbers: with units, and with invalid ones rejected in place.
 
-use decoupler_core::{dataset::Simulation, sensor::ArrayScale};
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
@@ -162,28 +161,4 @@ fn a_double_click_sets_every_slider_to_its_default_value() {
     assert_eq!(driver.views().train.press.finger.depth_share, 0.2);
     double_click_slider(&mut driver, "Depth of the press");
     assert_eq!(driver.views().train.press.finger.depth_share, 0.8);
-
-    driver.act("Show Identifiability");
-    let usual = Simulation::default();
-    for (field, typed) in [
-        ("Height", "7"),
-        ("Node pitch", "3"),
-        ("Row pitch", "2"),
-        ("Column pitch", "3"),
-        ("Column node pitch", "3"),
-        ("First column node at x", "3"),
-        ("Relative noise", "0.01"),
-        ("Compression", "3"),
-        ("Column-wires", "12"),
-        ("Nodes on each column", "2"),
-    ] {
-        driver.enter(field, typed);
-        double_click_slider(&mut driver, &format!("{field} slider"));
-    }
-    let question = driver.views().identifiability.question;
-    assert_eq!(question.sensor.geometry, usual.sensor.geometry);
-    assert_eq!(question.scene.noise, usual.scene.noise);
-    assert_eq!(question.compression, 0.5 * usual.scene.largest_compression);
-    let columns = |scale: ArrayScale| (scale.columns(), scale.nodes_per_column());
-    assert_eq!(columns(question.sensor.scale), columns(usual.sensor.scale));
 }

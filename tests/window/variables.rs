@@ -24,7 +24,7 @@ fn meaning(driver: &Driver, column: &str) -> Option<String> {
 #[test]
 fn columns_are_computed_from_others_and_wrong_expressions_are_refused_with_the_reason() {
     let (mut driver, path, _folder) = opened(90);
-    driver.unfold_to("Derived columns", "Expressions");
+    driver.unfold_to("Computed columns", "Expressions");
     driver.enter("Expressions", "d=u1-u2, r=u1/start(1s)");
     driver.wait("the new columns", |driver| driver.has("Meaning of r"));
     driver.wait("the samples", |driver| driver.says("Test: "));

@@ -3,21 +3,19 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
-use super::{DecouplerWindow, clipboard::ToCopy, files::Found, remembered::is_within_limits, save_form::Saving};
+use super::{DecouplerWindow, files::ToWrite, modal::Modal, remembered::is_within_limits, save_form::Saving};
 use crate::window::{
     job::caught,
     preview,
     shared::{
-        Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, RecordingDraft, RunView, SourceKind,
-        refuse_in_use,
+        Effect, FileInUse, FileTask, Look, Matter, Phase, Purpose, RecordingDraft, RunsRequest, SourceKind, ViewKind,
     },
-    test_view::HeightScale,
     theme,
-    training_worker::{Inspection, LOST, Request},
+    training_worker::{LOST, Origin, Request, TrainedRun},
     views::CHECKPOINT,
 };
-use decoupler_core::{dataset::Simulation, evaluation::RunSettings};
-use decoupler_files::{figure::SequentialMap, import::Setup};
+use decoupler_core::evaluation::RunSettings;
+use decoupler_files::import::Setup;
 
 impl DecouplerWindow {
     /// Applies an effect requested by a view.
@@ -42,24 +40,20 @@ impl DecouplerWindow {
             Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
             Effect::ChooseSource(_) => {}
             Effect::TakeSetup(setup) => self.take_setup(&setup),
-            Effect::ShowTraining => self.show(0),
-            Effect::Train => {
-                self.opened = None;
-                match shared.setup() {
-                    Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
-                        self.prepare(Request::Choose(Box::new(setup)));
-                    }
-                    Ok(setup) => self.prepare(Request::Train(Box::new(setup))),
-                    Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
+            Effect::ShowTraining => self.show(ViewKind::Train),
+            Effect::Train => match shared.setup() {
+                Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
+                    self.begin(Origin::Chosen(Box::new(setup)));
                 }
-            }
+                Ok(setup) => self.begin(Origin::New(Box::new(setup))),
+                Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
+            },
             // A training may have begun in the same frame.
             Effect::OpenTraining(_) | Effect::TakeUp(..) if shared.phase.is_busy() => {}
-            Effect::OpenTraining(path) => self.open_training(path),
+            Effect::OpenTraining(path) => self.begin(Origin::File(path)),
             Effect::TakeUp(setup, states) => {
-                self.opened = None;
                 self.take_setup(&setup);
-                self.prepare(Request::TakeUp(setup, states));
+                self.begin(Origin::States(setup, states));
             }
             Effect::Pause => {
                 shared.phase = Phase::Paused;
@@ -90,30 +84,41 @@ impl DecouplerWindow {
                 }
             }
             Effect::Look(look) => self.look(look),
-            Effect::Watch(snapshot) => self.worker.watch(snapshot),
             Effect::ChooseFile(task) => {
-                if !self.dialogs.ask(&task, Arc::clone(&self.wake)) {
+                if !self.dialogs.ask(&task) {
                     self.type_path(task);
                 }
             }
-            Effect::TypePath(task) => self.type_path(task),
-            Effect::Copy { text, notice } => self.copy_text(text, notice),
-            Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
-            Effect::KeepRun(file) => self.runs.keep(*file),
-            Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
-            Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
-            Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
+            Effect::Export(exporting) => self.modal = Some(Modal::Export(*exporting)),
+            Effect::Copy(to_copy, notice) => self.copy(to_copy, notice),
+            Effect::KeepRun(file) => self.runs.ask(RunsRequest::Keep(file)),
+            Effect::RenameRun(id, name) => self.runs.ask(RunsRequest::Rename(id, name)),
+            Effect::PinRun(place, id) => self.runs.ask(RunsRequest::Pin(place, id)),
+            Effect::RemoveRun(id) => self.runs.ask(RunsRequest::Remove(id)),
             Effect::Notify(matter, notice) => self.notices.add(matter, notice),
             Effect::Settle(matter) => self.notices.settle(matter),
         }
     }
 
     /// Requests a training that replaces the displayed one.
-    fn prepare(&mut self, request: Request) {
+    pub(super) fn begin(&mut self, origin: Origin) {
+        self.opened = match &origin {
+            Origin::File(path) => Some(path.clone()),
+            _ => None,
+        };
         self.shared.phase = Phase::Preparing;
         self.notices.settle(Matter::Training);
         self.notices.settle(Matter::Settings);
-        self.worker.ask(request);
+        if self.worker.has_died() {
+            self.restart_worker();
+        }
+        self.worker.begin(origin);
+    }
+
+    /// Starts the worker again after it died.
+    pub(super) fn restart_worker(&mut self) {
+        self.worker.restart(Arc::clone(&self.wake));
+        self.keep_trainings();
     }
 
     /// Chooses settings automatically from now on, or begins with those that were chosen.
@@ -124,71 +129,26 @@ impl DecouplerWindow {
             self.take_setup(&setup);
             // Given by hand, these settings would have had the same result.
             if let Some(run) = &mut self.shared.run {
+                run.plan = setup.plan().map(|plan| Arc::new(plan.clone()));
                 run.asked = setup;
             }
+            self.share_plan();
         }
     }
 
-    /// Opens the training saved in this checkpoint.
-    fn open_training(&mut self, path: PathBuf) {
-        self.opened = Some(path.clone());
-        self.prepare(Request::Open(path));
-    }
-
-    /// Resumes the training that was cut short.
-    pub(super) fn resume_cut_short(&mut self) {
-        self.opened = None;
-        self.notices.settle(Matter::CutShort);
-        self.prepare(Request::ResumeLeft);
-    }
-
-    /// Discards the training that was cut short.
-    pub(super) fn discard_cut_short(&mut self) {
-        self.notices.settle(Matter::CutShort);
-        self.worker.ask(Request::DiscardLeft);
-    }
-
-    /// Shows the view in this place.
-    pub(super) fn show(&mut self, place: usize) {
-        self.shown = place;
+    /// Shows a view.
+    pub(super) fn show(&mut self, view: ViewKind) {
+        self.shared.shown = view;
         // Another window may have changed the list.
-        self.runs.look();
-        self.views.all()[place].enter(&self.shared);
-    }
-
-    /// Shows and remembers the theme that the user chose.
-    pub(super) fn choose_theme(&mut self, is_dark: bool) {
-        self.set_dark(is_dark);
-        self.remembered.is_dark = Some(is_dark);
+        self.runs.ask(RunsRequest::Look);
     }
 
     /// Sets the look of all surfaces, and remembers the colours that the user chose.
-    fn look(&mut self, look: Look) {
+    pub(super) fn look(&mut self, look: Look) {
         if look.colours != self.shared.look.colours {
-            self.remembered.colours = Some(look.colours);
+            self.chosen.colours = Some(look.colours);
         }
         self.shared.look = look;
-    }
-
-    /// Offers the colour maps, and to lock or free the colour scales.
-    pub(super) fn offer_colours(&mut self, offers: &mut Offers<'_>) {
-        let look = self.shared.look;
-        for colours in SequentialMap::ALL {
-            if offers.offer(format!("Colours: {}", colours.name()), colours != look.colours) {
-                self.look(Look { colours, ..look });
-            }
-        }
-        let (name, heights) = match look.heights {
-            HeightScale::Stroke => ("Free the scale of heights", HeightScale::Fitted),
-            HeightScale::Fitted => ("Lock the scale of heights", HeightScale::Stroke),
-        };
-        if offers.offer(name, true) {
-            self.look(Look { heights, ..look });
-        }
-        if offers.offer("Free the scale of errors", look.error_limit_mm.is_some()) {
-            let error_limit_mm = None;
-            self.look(Look { error_limit_mm, ..look });
-        }
     }
 
     pub(super) fn set_dark(&mut self, is_dark: bool) {
@@ -196,65 +156,26 @@ impl DecouplerWindow {
         theme::apply(&self.ctx, is_dark);
     }
 
-    /// Asks for a path in the window itself, and suggests the path typed last for the same file.
+    /// Asks for a path in the window itself.
     pub(super) fn type_path(&mut self, task: FileTask) {
-        let is_same = |typed: &&Saving| typed.task.is_same_file(&task);
-        let path = match self.typed.as_ref().filter(is_same) {
-            Some(typed) => typed.path.clone(),
-            None => task.suggested_path().display().to_string(),
-        };
-        self.saving = Some(Saving::new(task, path));
+        let path = task.suggested_path().display().to_string();
+        self.modal = Some(Modal::Path(Saving::new(task, path, None)));
     }
 
-    /// Accepts the path typed in the form, after checking for a file there. Files to be read and folders are not
-    /// checked.
-    pub(super) fn take_typed(&mut self, path: PathBuf) {
-        let Some(task) = self.saving.as_ref().map(|saving| saving.task.clone()) else {
-            return;
-        };
-        // A folder is never replaced as a whole.
-        if task.is_read() || task.words.extensions.is_empty() {
-            return self.take_path(path);
-        }
-        // A file that is being written counts as existing.
-        let found = self.files.paths().any(|other| other == path).then_some(Found::File);
-        let used = self.files_in_use(&task);
-        if let Some(saving) = &mut self.saving {
-            saving.wait_for_check();
-            match found {
-                Some(found) => {
-                    saving.take(&path, found);
-                }
-                None => self.path_checks.start(path, used),
-            }
+    /// Closes the form and carries out its task on the file at `path`; `asks` whether a file there may be replaced.
+    pub(super) fn take_typed(&mut self, path: PathBuf, asks: bool) {
+        if let Some(Modal::Path(typed)) = self.modal.take() {
+            self.answer(typed.task, path, asks);
         }
         self.ctx.request_repaint();
     }
 
-    /// Takes the results of checking typed paths.
-    pub(super) fn take_path_checks(&mut self) {
-        while let Some((path, found)) = self.path_checks.next_checked() {
-            let Some(saving) = &mut self.saving else { continue };
-            let was_checking = saving.checked_path().is_some();
-            if saving.take(&path, found) {
-                self.take_path(path);
-            } else if was_checking && saving.checked_path().is_none() {
-                self.stay_for_path();
-            }
-        }
-    }
-
-    /// Closes the form and carries out its task on the file at `path`.
-    pub(super) fn take_path(&mut self, path: PathBuf) {
-        self.typed = self.saving.take();
-        if let Some(typed) = self.typed.clone() {
-            self.answer(typed.task, path);
-        }
-    }
-
     /// Returns the files in use, which the file of `task` must not overwrite.
     fn files_in_use(&mut self, task: &FileTask) -> Vec<FileInUse> {
-        let mut used: Vec<FileInUse> = self.views.all().iter().flat_map(|view| view.files_in_use()).collect();
+        let mut used = Vec::new();
+        for view in ViewKind::ALL {
+            used.extend(self.views.get(view).holdings(&self.shared).files);
+        }
         used.extend(self.opened.clone().map(FileInUse::Checkpoint));
         // A checkpoint may be saved over the one before it.
         let is_checkpoint = task.words.kind == CHECKPOINT.kind;
@@ -263,36 +184,36 @@ impl DecouplerWindow {
         used
     }
 
-    /// Carries out `task` on the file at `path`.
-    pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
-        // A dialog of the desktop has asked whether to replace a file, but does not know which files are in use.
-        let used = self.files_in_use(&task);
-        if !self.take_path_on_closing(&task, &path) {
-            return;
-        }
-        match task.purpose {
-            Purpose::SaveTraining(run, contents) => {
+    /// Carries out `task` on the file at `path`; `asks` whether a file there may be replaced. A dialog of the desktop has
+    /// asked, but does not know which files are in use.
+    pub(super) fn answer(&mut self, task: FileTask, path: PathBuf, asks: bool) {
+        match &task.purpose {
+            Purpose::Save(contents) => {
                 let (send, taken) = channel();
-                let inspection = Inspection::new(move |run| {
+                let (run, contents) = (contents.run, contents.clone());
+                let take = move |trained: Result<Option<&TrainedRun>, &str>| {
                     // The training continues if this panics.
                     let taken = caught("training", || {
-                        run.map_err(str::to_owned).and_then(|run| contents.take(run))
+                        trained
+                            .map_err(str::to_owned)
+                            .and_then(|trained| contents.take(trained))
                     });
-                    let taken = taken.map_err(|error| error.to_string()).flatten();
                     // The thread that writes the file is waiting for it.
-                    let _ = send.send(taken);
-                });
-                self.worker.ask(Request::Inspect(run, inspection));
-                self.files.write(path, move |path| {
-                    refuse_in_use(path, &used)?;
+                    let _ = send.send(taken.map_err(|error| error.to_string()).flatten());
+                };
+                match run {
+                    Some(run) => {
+                        let inspection = Box::new(move |trained: Result<&TrainedRun, &str>| take(trained.map(Some)));
+                        self.worker.ask(Request::Inspect(run, inspection));
+                    }
+                    None => take(Ok(None)),
+                }
+                let used = self.files_in_use(&task);
+                self.files.write(ToWrite { task, path, asks }, used, move |path| {
                     let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
-                    taken?.write(path)
+                    taken?(path)
                 });
             }
-            Purpose::Save(contents) => self.files.write(path, move |path| {
-                refuse_in_use(path, &used)?;
-                contents.write(path)
-            }),
             Purpose::Choose(chosen) => {
                 // A view that has asked for another file since has no use for this one.
                 let _ = chosen.send(path);
@@ -300,16 +221,8 @@ impl DecouplerWindow {
             }
             // A training may have begun while the desktop's dialog was open.
             Purpose::Open if self.shared.phase.is_busy() => {}
-            Purpose::Open => self.open_training(path),
+            Purpose::Open => self.begin(Origin::File(path)),
         }
-    }
-
-    /// Starts the worker again after it died.
-    pub(super) fn restart_worker(&mut self) {
-        self.worker.restart(Arc::clone(&self.wake));
-        self.keep_trainings();
-        self.shared.phase = self.shared.phase_at_rest();
-        self.notices.settle(Matter::Training);
     }
 
     /// Takes new settings; if they change the test set, shows that of the new ones.
@@ -319,10 +232,7 @@ impl DecouplerWindow {
         if is_within_limits(&draft) {
             self.notices.settle(Matter::Settings);
         }
-        let run = self.shared.run.as_ref();
-        if run.is_some_and(|run| is_of_test_set(run, &draft)) {
-            self.shared.preview = None;
-        } else if !have_same_sets(&before, &draft) {
+        if !have_same_sets(&before, &draft) {
             self.request_preview();
         }
     }
@@ -332,7 +242,6 @@ impl DecouplerWindow {
         self.shared.source = source;
         self.notices.settle(Matter::Settings);
         if source == SourceKind::Array {
-            self.configure(self.shared.draft);
             self.request_preview();
         }
     }
@@ -357,44 +266,39 @@ impl DecouplerWindow {
         }
     }
 
-    /// Requests the test set and baselines shown before a training, unless they are known.
+    /// Requests the test set and baselines shown before a training, unless the current training has them.
     pub(super) fn request_preview(&mut self) {
-        let shared = &self.shared;
+        let shared = &mut self.shared;
         let draft = shared.draft;
-        match (&shared.preview, &shared.run) {
-            (Some(preview), _) if have_same_test_set(&preview.settings, &draft) => {
-                preview::compare(&mut self.previews, draft);
-            }
-            (None, Some(run)) if is_of_test_set(run, &draft) => {}
-            _ => preview::draw(&mut self.previews, draft),
+        if shared
+            .run
+            .as_ref()
+            .is_some_and(|run| have_same_test_set(run.settings(), &draft))
+        {
+            shared.preview = None;
+            return self.previews.abandon();
         }
+        let preview = shared.preview.as_ref();
+        let is_known = preview.is_some_and(|preview| have_same_test_set(&preview.settings, &draft));
+        preview::request(&mut self.previews, draft, is_known);
     }
 }
 
-/// Returns true if `run` is on a simulated array with the test set of these settings.
-pub(super) fn is_of_test_set(run: &RunView, settings: &RunSettings) -> bool {
-    have_same_test_set(run.settings(), settings)
-}
-
 /// Returns true if both draw the same test set.
-pub(super) fn have_same_test_set(a: &RunSettings, b: &RunSettings) -> bool {
+fn have_same_test_set(a: &RunSettings, b: &RunSettings) -> bool {
     let test_set = |settings: &RunSettings| {
-        let Simulation {
-            sensor,
-            scene,
-            test_samples,
-            ..
-        } = *settings.simulation()?;
-        Some((sensor, scene, test_samples, settings.seed))
+        let simulation = settings.simulation()?;
+        Some((
+            simulation.sensor,
+            simulation.scene,
+            simulation.test_samples,
+            settings.seed,
+        ))
     };
     test_set(a).is_some() && test_set(a) == test_set(b)
 }
 
 /// Returns true if both draw the same samples, trained on or not.
-pub(super) fn have_same_sets(a: &RunSettings, b: &RunSettings) -> bool {
-    let samples = |settings: &RunSettings| {
-        let simulation = settings.simulation()?;
-        Some((simulation.samples, simulation.validation_samples))
-    };
-    have_same_test_set(a, b) && samples(a) == samples(b)
+fn have_same_sets(a: &RunSettings, b: &RunSettings) -> bool {
+    (a.source, a.seed) == (b.source, b.seed)
 }

@@ -1,21 +1,18 @@
 //! The clipboard, which reports whether copying succeeded.
 //!
-//! Text and pictures are copied in the background; a context menu copies values, pictures and tables.
+//! Text and pictures are copied in the background.
 
 use std::{
-    env, fmt,
+    env,
     sync::{Arc, Mutex, PoisonError},
 };
 
-use decoupler_files::figure::Figure;
-use eframe::egui::{ColorImage, Id, Response, ScrollArea, Ui};
+use eframe::egui::ColorImage;
 
 use super::{DecouplerWindow, Desktop};
 use crate::window::{
     job::{Background, JobError, Wake},
-    shared::{Effect, Export, ExportGroup, Matter, Notice},
-    theme::space,
-    widgets::{dim_ui, take_claim, take_value_under},
+    shared::{Matter, Notice, ToCopy},
 };
 
 /// Content for the clipboard.
@@ -31,57 +28,42 @@ type Put = dyn Fn(Content) -> Result<(), String> + Send + Sync;
 
 /// Destination of copies.
 #[derive(Clone)]
-pub(super) enum Clipboard {
-    /// The system's clipboard, which reports whether copying succeeded.
-    System(Arc<Put>),
-    /// The system's clipboard under Wayland. A compositor may let a program copy only through its focused window, which
-    /// reports nothing, so text is copied both ways.
-    Wayland(Arc<Put>),
-    /// The toolkit's clipboard alone.
-    Toolkit,
+pub(super) struct Clipboard {
+    /// The system's clipboard, which reports whether copying succeeded; without it, the toolkit copies.
+    system: Option<Arc<Put>>,
+    /// True under Wayland. A compositor may let a program copy only through its focused window, which reports nothing, so text
+    /// is copied both ways.
+    is_wayland: bool,
 }
 
 impl Clipboard {
     /// The clipboard of a desktop.
     pub(super) fn of(desktop: Desktop) -> Self {
-        let has_wayland = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET"]
-            .iter()
-            .any(|name| env::var_os(name).is_some_and(|value| !value.is_empty()));
-        match desktop {
-            Desktop::None => Self::Toolkit,
-            Desktop::Native if has_wayland => Self::Wayland(system()),
-            Desktop::Native => Self::System(system()),
+        let is_set = |name| env::var_os(name).is_some_and(|value| !value.is_empty());
+        Self {
+            system: (desktop == Desktop::Native).then(system),
+            is_wayland: ["WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(is_set),
         }
     }
 
     /// Puts `content` on the clipboard. Returns the content left for the toolkit to copy, and the message for the user:
     /// `notice` on success.
-    pub(super) fn take(&self, content: Content, notice: String) -> (Option<Content>, Notice) {
-        match self {
-            Self::Toolkit => (Some(content), Notice::Done(notice)),
-            Self::System(put) => (None, outcome(put(content), notice)),
-            Self::Wayland(put) => match &content {
-                Content::Picture { .. } => (None, outcome(put(content), notice)),
-                Content::Text(_) => {
-                    let notice = match put(content.clone()) {
-                        Ok(()) => notice,
-                        Err(_) => format!("{notice}. {UNCONFIRMED}"),
-                    };
-                    (Some(content), Notice::Done(notice))
-                }
-            },
-        }
+    fn take(&self, content: Content, notice: String) -> Copied {
+        let Some(put) = &self.system else {
+            return (Some(content), Notice::Done(notice));
+        };
+        let is_text = matches!(content, Content::Text(_));
+        let for_toolkit = (self.is_wayland && is_text).then(|| content.clone());
+        let notice = match put(content) {
+            Ok(()) => Notice::Done(notice),
+            Err(_) if for_toolkit.is_some() => Notice::Done(format!("{notice}. {UNCONFIRMED}")),
+            Err(reason) => not_copied(&reason),
+        };
+        (for_toolkit, notice)
     }
 }
 
 const UNCONFIRMED: &str = "This desktop does not confirm copying: if pasting fails, export a file instead";
-
-fn outcome(put: Result<(), String>, notice: String) -> Notice {
-    match put {
-        Ok(()) => Notice::Done(notice),
-        Err(reason) => not_copied(&reason),
-    }
-}
 
 /// Returns access to the system's clipboard. Under X11 its contents last only as long as the returned value, because the
 /// program that copied serves them itself.
@@ -109,155 +91,57 @@ fn system() -> Arc<Put> {
     })
 }
 
-impl fmt::Debug for Clipboard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::System(_) => "System",
-            Self::Wayland(_) => "Wayland",
-            Self::Toolkit => "Toolkit",
-        })
-    }
-}
-
-/// Something to be copied.
-#[derive(Debug)]
-pub(super) enum ToCopy {
-    /// Text as it is.
-    Text(String),
-    /// A picture, still to be drawn.
-    Picture(Box<Figure>),
-}
-
-impl ToCopy {
-    fn into_content(self) -> Result<Content, String> {
-        match self {
-            Self::Text(text) => Ok(Content::Text(text)),
-            Self::Picture(figure) => {
-                let (size, rgba) = figure.draw().pixels().map_err(|error| error.to_string())?;
-                Ok(Content::Picture { size, rgba })
-            }
-        }
-    }
-}
-
 /// Outcome of copying: the content left for the toolkit to copy, if any, and the message for the user.
 type Copied = (Option<Content>, Notice);
 
 /// Content being copied in the background; the newest wins.
-#[derive(Debug)]
 pub(super) struct Copying {
     clipboard: Clipboard,
     job: Background<Result<Copied, JobError>>,
 }
 
 impl Copying {
-    pub(super) fn new(clipboard: Clipboard, wake: Wake) -> Self {
+    pub(super) fn new(desktop: Desktop, wake: Wake) -> Self {
         Self {
-            clipboard,
+            clipboard: Clipboard::of(desktop),
             job: Background::prompt("clipboard", wake),
         }
-    }
-
-    /// Copies `to_copy`; `notice` is the message for the user once the clipboard has it.
-    pub(super) fn start(&mut self, to_copy: ToCopy, notice: String) {
-        let clipboard = self.clipboard.clone();
-        self.job.abandon();
-        self.job.start(
-            move |_| match to_copy.into_content() {
-                Ok(content) => clipboard.take(content, notice),
-                Err(reason) => (None, not_copied(&reason)),
-            },
-            |copied| copied,
-        );
     }
 }
 
 /// Notice that nothing was copied.
-pub(super) fn not_copied(reason: &str) -> Notice {
+fn not_copied(reason: &str) -> Notice {
     Notice::Failed(format!("Nothing was copied: {}", reason.trim_end_matches('.')))
 }
 
 impl DecouplerWindow {
-    /// Copies text; `notice` is the message for the user once the clipboard has it.
-    pub(super) fn copy_text(&mut self, text: String, notice: String) {
-        match &self.copying.clipboard {
-            // There is nothing to wait for.
-            toolkit @ Clipboard::Toolkit => {
-                let copied = toolkit.take(Content::Text(text), notice);
-                self.report_copied(copied);
-            }
-            _ => self.copying.start(ToCopy::Text(text), notice),
-        }
+    /// Copies `to_copy`; `notice` is the message for the user once the clipboard has it.
+    pub(super) fn copy(&mut self, to_copy: ToCopy, notice: String) {
+        let clipboard = self.copying.clipboard.clone();
+        let copy = move || match to_copy {
+            ToCopy::Text(text) => clipboard.take(Content::Text(text), notice),
+            ToCopy::Picture(figure) => match figure.draw().pixels() {
+                Ok((size, rgba)) => clipboard.take(Content::Picture { size, rgba }, notice),
+                Err(error) => (None, not_copied(&error.to_string())),
+            },
+        };
+        self.copying.job.abandon();
+        self.copying.job.start(move |_| copy(), |copied| copied);
     }
 
     /// Shows a notice of what was copied.
     pub(super) fn take_copied(&mut self) {
         while let Some(copied) = self.copying.job.next_event() {
-            self.report_copied(copied.unwrap_or_else(|error| (None, not_copied(&error.to_string()))));
-        }
-    }
-
-    fn report_copied(&mut self, (for_toolkit, notice): Copied) {
-        match for_toolkit {
-            Some(Content::Text(text)) => self.ctx.copy_text(text),
-            Some(Content::Picture { size, rgba }) => {
-                self.ctx.copy_image(ColorImage::from_rgba_unmultiplied(size, &rgba));
+            let (for_toolkit, notice) = copied.unwrap_or_else(|error| (None, not_copied(&error.to_string())));
+            match for_toolkit {
+                Some(Content::Text(text)) => self.ctx.copy_text(text),
+                Some(Content::Picture { size, rgba }) => {
+                    self.ctx.copy_image(ColorImage::from_rgba_unmultiplied(size, &rgba));
+                }
+                None => {}
             }
-            None => {}
+            self.notices.add(Matter::Clipboard, notice);
         }
-        self.notices.add(Matter::Clipboard, notice);
-    }
-}
-
-/// Context menu of a part of the window: copies the value under the pointer, or a picture or table of the current view.
-pub(super) fn copy_menu_ui<'a>(part: &Response, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
-    let id = Id::unique("value to copy");
-    let is_asked = part.container_secondary_clicked();
-    // A field inside the part may have a menu of its own.
-    if is_asked && take_claim(&part.ctx) {
-        return;
-    }
-    if is_asked {
-        let value = take_value_under(&part.ctx);
-        part.ctx.data_mut(|data| data.insert_temp(id, value));
-    }
-    part.container_context_menu(|ui| menu_ui(ui, id, exports(), effects));
-}
-
-fn menu_ui(ui: &mut Ui, id: Id, exports: Vec<Export<'_>>, effects: &mut Vec<Effect>) {
-    ui.set_min_width(space(60));
-    let mut is_empty = true;
-    if let Some(value) = ui.data(|data| data.get_temp::<Option<String>>(id)).flatten() {
-        is_empty = false;
-        let shown = value.lines().next().unwrap_or_default();
-        if ui.button(format!("Copy “{shown}”")).clicked() {
-            let notice = format!("Copied {shown}");
-            effects.push(Effect::Copy { text: value, notice });
-            ui.close();
-        }
-        ui.separator();
-    }
-    ScrollArea::vertical().max_height(space(100)).show(ui, |ui| {
-        for export in exports {
-            let is_meant = export.is_copy() || export.group == ExportGroup::Figures;
-            let label = export.label();
-            let Some(ask) = export.ask.ok().filter(|_| is_meant) else {
-                continue;
-            };
-            is_empty = false;
-            let text = if label.starts_with("Copy") {
-                label
-            } else {
-                format!("{label}…")
-            };
-            if ui.button(text).on_hover_text(export.description).clicked() {
-                effects.push(ask());
-                ui.close();
-            }
-        }
-    });
-    if is_empty {
-        dim_ui(ui, "There is nothing to copy here yet.");
     }
 }
 
@@ -268,6 +152,11 @@ mod tests {
     #[test]
     fn a_refusing_clipboard_is_reported_as_a_failure_and_never_as_copied() {
         let refusing: Arc<Put> = Arc::new(|_| Err("another program holds it.".to_owned()));
+        let willing: Arc<Put> = Arc::new(|_| Ok(()));
+        let on = |put: &Arc<Put>, is_wayland| Clipboard {
+            system: Some(Arc::clone(put)),
+            is_wayland,
+        };
         let text = Content::Text("1".to_owned());
         let picture = Content::Picture {
             size: [1, 1],
@@ -277,17 +166,17 @@ mod tests {
         let done = |text: &str| Notice::Done(text.to_owned());
         let copied = |clipboard: &Clipboard, content: &Content| clipboard.take(content.clone(), "Copied it".to_owned());
         for content in [&text, &picture] {
-            let clipboard = Clipboard::System(Arc::clone(&refusing));
+            let clipboard = on(&refusing, false);
             assert_eq!(copied(&clipboard, content), (None, refused.clone()));
-            let clipboard = Clipboard::System(Arc::new(|_| Ok(())));
+            let clipboard = on(&willing, false);
             assert_eq!(copied(&clipboard, content), (None, done("Copied it")));
         }
         // Under Wayland a window may copy text without learning whether that succeeded.
-        let wayland = Clipboard::Wayland(refusing);
+        let wayland = on(&refusing, true);
         let unconfirmed = done(&format!("Copied it. {UNCONFIRMED}"));
         assert_eq!(copied(&wayland, &text), (Some(text.clone()), unconfirmed));
         assert_eq!(copied(&wayland, &picture), (None, refused));
-        let wayland = Clipboard::Wayland(Arc::new(|_| Ok(())));
+        let wayland = on(&willing, true);
         assert_eq!(copied(&wayland, &text), (Some(text.clone()), done("Copied it")));
     }
 }

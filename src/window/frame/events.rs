@@ -1,13 +1,14 @@
 use super::{
     DecouplerWindow,
-    applying::{have_same_sets, have_same_test_set, is_of_test_set},
-    files::Answer,
+    files::{Answer, ToWrite, Written},
+    modal::Modal,
+    save_form::{Saving, Tried},
 };
 use crate::window::{
     job::JobError,
     preview::PreviewEvent,
-    shared::{Matter, Notice, Phase, Preview, RunView},
-    training_worker::{Began, Event},
+    shared::{Matter, Notice, Phase, Preview, RunView, RunsRequest, ViewKind},
+    training_worker::{Event, Start},
 };
 use decoupler_core::evaluation::RunSettings;
 
@@ -29,17 +30,17 @@ impl DecouplerWindow {
         }
         while let Some((task, answer)) = self.dialogs.next_answer() {
             match answer {
-                Answer::Chosen(path) => self.answer(task, path),
+                Answer::Chosen(path) => self.answer(task, path, false),
                 Answer::NoDialog => self.type_path(task),
                 Answer::Cancelled => {}
             }
         }
-        self.take_path_checks();
         let mut effects = Vec::new();
         let mut working = Vec::new();
-        for view in self.views.all() {
+        for kind in ViewKind::ALL {
+            let view = self.views.get(kind);
             view.take_events(&self.shared, &mut effects);
-            working.extend(view.is_working().then(|| view.name()));
+            working.extend(view.holdings(&self.shared).is_computing.then_some(kind));
         }
         self.shared.working = working;
         self.apply_all(effects);
@@ -53,61 +54,66 @@ impl DecouplerWindow {
         self.request_preview();
     }
 
-    fn report_written(&mut self, written: Result<String, String>) {
-        let notice = match written {
-            Ok(message) => {
-                self.typed = None;
-                Notice::Done(message)
+    fn report_written(&mut self, (ToWrite { task, path, asks }, written): (ToWrite, Written)) {
+        let tried = match written {
+            Written::Done(message) => {
+                return self.notices.add(Matter::File, Notice::Saved(message, path));
             }
-            Err(reason) => {
+            Written::Exists => Tried::Exists,
+            Written::InUse(reason) if asks => Tried::Refused(reason),
+            Written::InUse(reason) | Written::Failed(reason) => {
                 // The user must see this.
-                self.closing = None;
-                Notice::Failed(reason)
+                self.modal.take_if(|modal| matches!(modal, Modal::Closing(_)));
+                return self.notices.fail(Matter::File, reason);
             }
         };
-        self.notices.add(Matter::File, notice);
+        self.modal = Some(Modal::Path(Saving::new(task, path.display().to_string(), Some(tried))));
     }
 
-    pub(super) fn take_preview(&mut self, event: PreviewEvent) {
-        let shared = &mut self.shared;
+    fn take_preview(&mut self, event: PreviewEvent) {
         match event {
-            // The settings have changed meanwhile, and have requested another test set or need none.
-            PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
-            // A training has begun meanwhile, with the same test set.
-            PreviewEvent::Drawn(settings, _)
-                if shared.run.as_ref().is_some_and(|run| is_of_test_set(run, &settings)) => {}
             PreviewEvent::Drawn(settings, Ok(test)) => {
-                shared.preview = Some(Preview {
+                self.shared.preview = Some(Preview {
                     settings: *settings,
                     test,
                     baselines: None,
                 });
-                self.request_preview();
             }
-            PreviewEvent::Drawn(_, Err(error)) => self.notices.fail(Matter::Preview, error),
-            PreviewEvent::Compared(settings, baselines) => {
-                if let Some(preview) = &mut shared.preview
-                    && have_same_sets(&settings, &shared.draft)
-                {
+            PreviewEvent::Compared(Ok(baselines)) => {
+                if let Some(preview) = &mut self.shared.preview {
                     preview.baselines = baselines;
                 }
             }
-            PreviewEvent::Failed(error) => self.notices.fail(Matter::Preview, error),
+            PreviewEvent::Drawn(_, Err(error)) => self.notices.fail(Matter::Preview, error),
+            PreviewEvent::Compared(Err(error)) => self.notices.fail(Matter::Preview, error),
         }
     }
 
-    /// Shows a training restored from a checkpoint. If it has ended, its next event says so.
-    fn take_opened(&mut self, began: Began, phase: Phase) {
+    /// Shows a training that has begun. If one from a checkpoint has ended, its next event says so.
+    fn take_begun(&mut self, began: RunView, start: Start) {
         let setup = began.setup.clone();
         self.shared.preview = None;
+        self.previews.abandon();
         self.shared.run = Some(RunView {
             // The checkpoint of one that was cut short is removed when the window closes.
-            is_saved: phase == Phase::Paused,
-            ..RunView::new(began)
+            is_saved: start == Start::Paused,
+            ..began
         });
-        self.take_setup(&setup);
-        self.typed = None;
-        self.shared.phase = phase;
+        if start != Start::New {
+            self.take_setup(&setup);
+        }
+        self.share_plan();
+        self.shared.phase = match start {
+            Start::Paused => Phase::Paused,
+            Start::New | Start::Resumed => Phase::Training,
+        };
+    }
+
+    /// Shares the plan on the left with the training, if they have the same.
+    pub(super) fn share_plan(&mut self) {
+        if let Some(run) = &mut self.shared.run {
+            run.share_plan(&self.shared.recording);
+        }
     }
 
     fn take_event(&mut self, event: Event) {
@@ -119,15 +125,18 @@ impl DecouplerWindow {
             shared.choosing = None;
         }
         match event {
-            Event::Began(Ok(began)) => {
-                shared.preview = None;
-                shared.run = Some(RunView::new(*began));
-                shared.phase = Phase::Training;
+            Event::Began(_, start, Ok(began)) => self.take_begun(*began, start),
+            Event::Began(_, start, Err(reason)) => {
+                let matter = if start == Start::New {
+                    Matter::Settings
+                } else {
+                    Matter::Training
+                };
+                self.refuse(matter, reason);
+                if let Some(path) = self.opened.clone() {
+                    self.views.look_for_recordings(path);
+                }
             }
-            Event::Began(Err(error)) => self.refuse(Matter::Settings, error.to_string()),
-            Event::Opened(Ok(began)) => self.take_opened(*began, Phase::Paused),
-            Event::Resumed(Ok(began)) => self.take_opened(*began, Phase::Training),
-            Event::Resumed(Err(reason)) => self.refuse(Matter::Training, reason),
             Event::Left(question) => {
                 self.notices.settle(Matter::CutShort);
                 if let Some(question) = question {
@@ -137,12 +146,6 @@ impl DecouplerWindow {
             Event::Unkept(reason) => {
                 let text = format!("A running training will be lost if the program ends: {reason}");
                 self.notices.fail(Matter::Memory, text);
-            }
-            Event::Opened(Err(reason)) => {
-                self.refuse(Matter::Training, reason);
-                if let Some(path) = self.opened.clone() {
-                    self.views.look_for_recordings(path);
-                }
             }
             Event::Continued(Ok(settings)) => {
                 // Settings that were chosen were not asked for.
@@ -179,20 +182,17 @@ impl DecouplerWindow {
                     run.progress(*progress);
                 }
             }
-            Event::Finished(Ok(file)) => self.runs.keep(*file),
+            Event::Finished(Ok(file)) => self.runs.ask(RunsRequest::Keep(file)),
             Event::Finished(Err(reason)) => self.notices.fail(Matter::Training, reason),
             Event::Died(reason) => {
-                match &reason {
-                    // The next training needs a thread.
-                    Some(JobError::Panicked { .. }) => self.restart_worker(),
-                    _ => shared.phase = Phase::Died,
+                shared.phase = shared.phase_at_rest();
+                if matches!(reason, Some(JobError::Panicked { .. })) {
+                    self.restart_worker();
                 }
                 let reason = reason.map(|error| format!(": {error}")).unwrap_or_default();
                 let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");
                 self.notices.fail(Matter::Training, text);
             }
-            // The worker does not pass these on.
-            Event::Abandoned => {}
         }
         if self.worker.is_preparing() {
             // The event belongs to the previous training.

@@ -1,12 +1,8 @@
-//! Files written in the background, each on its own thread.
-//!
-//! Native file dialogs, each awaited on its own thread.
-//!
-//! Checks of typed paths, each on its own thread: a network drive that does not answer must not block the window.
+//! Files written in the background and native file dialogs, each on its own thread: a network drive that does not answer
+//! must not block the window.
 
 use std::{
     fmt::{self, Display},
-    fs,
     path::{Path, PathBuf},
     pin::Pin,
     sync::Arc,
@@ -26,67 +22,119 @@ use super::{
     remembered::{MIN_SIZE_POINTS, Remembered, WindowFile},
 };
 use crate::window::{
-    job::{Background, JobError, Wake},
-    shared::{Effect, FileInUse, FileTask, refuse_in_use},
+    job::{Background, JobError, Wake, start_thread},
+    shared::{FileInUse, FileTask, Matter, ViewKind, refuse_in_use},
     theme::{Theme, radius, space, type_size},
 };
 
 /// Longest time that dropping waits for a file. A file that takes longer is removed when the program ends.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
-/// Message about a file, or the reason why it was not written, unless the thread failed.
-type Written = Result<Result<String, String>, JobError>;
-
-/// Files that are being written.
-pub struct Files {
+/// Jobs on threads of their own, each with what it is about.
+struct Pending<K, E> {
+    name: &'static str,
     wake: Wake,
-    under_way: Vec<(PathBuf, Background<Written>)>,
+    jobs: Vec<(K, Background<E>)>,
 }
+
+impl<K, E: Send + 'static> Pending<K, E> {
+    /// None yet. `wake` is called when one has ended.
+    fn new(name: &'static str, wake: Wake) -> Self {
+        let jobs = Vec::new();
+        Self { name, wake, jobs }
+    }
+
+    fn start<T: 'static>(
+        &mut self,
+        about: K,
+        work: impl FnOnce() -> T + Send + 'static,
+        last: fn(Result<T, JobError>) -> E,
+    ) {
+        let mut job = Background::prompt(self.name, Arc::clone(&self.wake));
+        job.start(move |_| work(), last);
+        self.jobs.push((about, job));
+    }
+
+    /// Returns the result of the next job that has ended.
+    fn next(&mut self) -> Option<(K, E)> {
+        let mut jobs = self.jobs.iter().enumerate();
+        let (number, result) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
+        Some((self.jobs.remove(number).0, result))
+    }
+}
+
+/// A file to be written.
+pub struct ToWrite {
+    /// Task of the file.
+    pub task: FileTask,
+    /// Its path.
+    pub path: PathBuf,
+    /// True if the user was not asked yet whether another file at the path may be replaced.
+    pub asks: bool,
+}
+
+/// Outcome of writing a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Written {
+    /// It is there, with the message for the user.
+    Done(String),
+    /// Another file is there, and the user is to be asked.
+    Exists,
+    /// It must not be written there, for this reason.
+    InUse(String),
+    /// It was not written, for this reason.
+    Failed(String),
+}
+
+/// Files that are being written in the background.
+pub struct Files(Pending<ToWrite, Result<Written, JobError>>);
 
 impl Files {
     /// No file yet. `wake` is called when one is written.
     pub fn new(wake: Wake) -> Self {
-        Self {
-            wake,
-            under_way: Vec::new(),
-        }
+        Self(Pending::new("file", wake))
     }
 
-    /// Writes the file `path` in the background. `write` returns the message for the user.
+    /// Writes a file, which must not be one of the files `used`.
     pub fn write<X: Display>(
         &mut self,
-        path: PathBuf,
+        to_write: ToWrite,
+        used: Vec<FileInUse>,
         write: impl FnOnce(&Path) -> Result<String, X> + Send + 'static,
     ) {
-        let mut job = Background::prompt("file", Arc::clone(&self.wake));
-        let target = path.clone();
-        job.start(
-            move |_| write(&target).map_err(|error| error.to_string()),
-            |written| written,
-        );
-        self.under_way.push((path, job));
+        let (path, asks) = (to_write.path.clone(), to_write.asks);
+        // A folder is never replaced as a whole; a file that is being written counts as existing.
+        let asks = asks && !to_write.task.words.extensions.is_empty();
+        let is_under_way = self.paths().any(|other| other == path);
+        let work = move || match refuse_in_use(&path, &used) {
+            Err(reason) => Written::InUse(reason),
+            // A folder is not a file that could be lost, and a pipe or a device is meant to be written to.
+            Ok(()) if asks && (is_under_way || path.is_file()) => Written::Exists,
+            Ok(()) => match write(&path) {
+                Ok(message) => Written::Done(message),
+                Err(reason) => Written::Failed(reason.to_string()),
+            },
+        };
+        self.0.start(to_write, work, |written| written);
     }
 
-    /// Returns the message about the next file that was written, or the reason why it was not.
-    pub fn next_written(&mut self) -> Option<Result<String, String>> {
-        let mut jobs = self.under_way.iter().enumerate();
-        let (number, written) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
-        let (path, _) = self.under_way.remove(number);
-        Some(match written {
-            Ok(written) => written,
-            Err(error) => Err(format!("cannot write '{}': {error}", path.display())),
-        })
+    /// Returns the next file that was written, or was not.
+    pub fn next_written(&mut self) -> Option<(ToWrite, Written)> {
+        let (to_write, written) = self.0.next()?;
+        let failed = |error| Written::Failed(format!("cannot write '{}': {error}", to_write.path.display()));
+        let written = written.unwrap_or_else(failed);
+        Some((to_write, written))
     }
 
     /// Paths of the files that are being written.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        self.under_way.iter().map(|(path, _)| path.as_path())
+        self.0.jobs.iter().map(|(to_write, _)| to_write.path.as_path())
     }
 }
 
 impl Drop for Files {
     fn drop(&mut self) {
-        for (_, job) in &mut self.under_way {
+        for (_, job) in &mut self.0.jobs {
             job.wait(LONGEST_WAIT);
         }
     }
@@ -96,6 +144,20 @@ impl fmt::Debug for Files {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_set().entries(self.paths()).finish()
     }
+}
+
+/// Shows the folder of a file in the desktop's file manager, on a thread of its own. A desktop without one shows nothing.
+pub(super) fn open_folder(path: &Path) {
+    let program = match std::env::consts::OS {
+        "windows" => "explorer",
+        "macos" => "open",
+        _ => "xdg-open",
+    };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut command = std::process::Command::new(program);
+    command.arg(folder.unwrap_or(Path::new(".")));
+    // Without another thread nothing is shown either.
+    let _ = start_thread("folder", move || command.status(), |_| ());
 }
 
 /// A dialog answered sooner than this was never shown: the desktop has none. The limit allows for a busy machine; a user
@@ -113,61 +175,48 @@ pub enum Answer {
     NoDialog,
 }
 
-/// Open dialogs, each with its task.
-#[derive(Debug)]
+/// Open dialogs of the desktop, each with its task.
 pub struct Dialogs {
-    desktop: Desktop,
-    asked: Vec<(FileTask, Background<Answer>)>,
+    /// Where they are shown.
+    pub desktop: Desktop,
+    asked: Pending<FileTask, Answer>,
 }
 
 impl Dialogs {
-    /// No dialog yet.
-    pub fn new(desktop: Desktop) -> Self {
-        Self {
-            desktop,
-            asked: Vec::new(),
-        }
+    /// No dialog yet. `wake` is called when one is answered.
+    pub fn new(desktop: Desktop, wake: Wake) -> Self {
+        let asked = Pending::new("file dialog", wake);
+        Self { desktop, asked }
     }
 
-    /// Asks for the path of a file; returns true if there is a dialog to ask with. `wake` is called when the answer has
-    /// come. Must run on the window's thread, which some desktops require.
-    pub fn ask(&mut self, task: &FileTask, wake: Wake) -> bool {
+    /// Asks for the path of a file; returns true if there is a dialog to ask with. Must run on the window's thread, which
+    /// some desktops require.
+    pub fn ask(&mut self, task: &FileTask) -> bool {
         if self.desktop == Desktop::None {
             return false;
         }
         let choice = choice(task);
         let asked = Instant::now();
-        let mut job = Background::prompt("file dialog", wake);
-        job.start(
-            move |_| match pollster::block_on(choice) {
-                Some(file) => Answer::Chosen(file.path().to_owned()),
-                None if asked.elapsed() < NO_PERSON => Answer::NoDialog,
-                None => Answer::Cancelled,
-            },
-            |answer| answer.unwrap_or(Answer::NoDialog),
-        );
-        self.asked.push((task.clone(), job));
+        let work = move || match pollster::block_on(choice) {
+            Some(file) => Answer::Chosen(file.path().to_owned()),
+            None if asked.elapsed() < NO_PERSON => Answer::NoDialog,
+            None => Answer::Cancelled,
+        };
+        self.asked
+            .start(task.clone(), work, |answer| answer.unwrap_or(Answer::NoDialog));
         true
     }
 
     /// Returns the next answer, if one has come, with its task.
     pub fn next_answer(&mut self) -> Option<(FileTask, Answer)> {
-        let mut jobs = self.asked.iter().enumerate();
-        let (number, answer) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
-        let (task, _) = self.asked.remove(number);
-        Some((task, answer))
-    }
-
-    /// Returns true while a dialog is open.
-    pub fn is_asking(&self) -> bool {
-        !self.asked.is_empty()
+        self.asked.next()
     }
 }
 
 /// Shows the dialog.
 fn choice(task: &FileTask) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> {
     let suggestion = task.suggested_path();
-    let mut dialog = rfd::AsyncFileDialog::new().set_title(format!("{} {}", task.verb(), task.words.kind));
+    let mut dialog = rfd::AsyncFileDialog::new().set_title(task.title());
     if task.is_read() && task.words.extensions.len() > 1 {
         dialog = dialog.add_filter(task.words.kind, task.words.extensions);
     }
@@ -273,90 +322,35 @@ fn without_source_line(message: &str) -> String {
     cause.map_or(message.to_owned(), |(before, cause)| format!("{before}{cause}"))
 }
 
-/// Result of checking a path to which a file is to be written.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Found {
-    /// Nothing that would be lost. Other problems with the path are reported when the file is written.
-    Nothing,
-    /// Another file.
-    File,
-    /// A file in use, and why it must not be overwritten.
-    InUse(String),
-}
-
-/// Paths that are being checked.
-pub(super) struct PathChecks {
-    wake: Wake,
-    under_way: Vec<(PathBuf, Background<Found>)>,
-}
-
-impl PathChecks {
-    /// None yet. `wake` is called when a path has been checked.
-    pub(super) fn new(wake: Wake) -> Self {
-        Self {
-            wake,
-            under_way: Vec::new(),
-        }
-    }
-
-    /// Checks `path`, which must not be one of the files `used`.
-    pub(super) fn start(&mut self, path: PathBuf, used: Vec<FileInUse>) {
-        // Each check has its own thread: one that never ends does not block the others.
-        let mut job = Background::prompt("path", Arc::clone(&self.wake));
-        let checked = path.clone();
-        job.start(
-            move |_| check_path(&checked, &used),
-            |found| found.unwrap_or_else(|error| Found::InUse(error.to_string())),
-        );
-        self.under_way.push((path, job));
-    }
-
-    /// Returns the next path that has been checked, with the result.
-    pub(super) fn next_checked(&mut self) -> Option<(PathBuf, Found)> {
-        let mut jobs = self.under_way.iter().enumerate();
-        let (number, found) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
-        let (path, _) = self.under_way.remove(number);
-        Some((path, found))
-    }
-}
-
-fn check_path(path: &Path, used: &[FileInUse]) -> Found {
-    match refuse_in_use(path, used) {
-        Err(reason) => Found::InUse(reason),
-        // A folder is not a file that could be lost, and a pipe or a device is meant to be written to.
-        Ok(()) if fs::metadata(path).is_ok_and(|found| found.is_file()) => Found::File,
-        Ok(()) => Found::Nothing,
-    }
-}
+/// Why no file is opened now.
+const BUSY: &str = "A training is running: stop it before you open other files.";
 
 impl DecouplerWindow {
     /// Gives files dropped on the window to the view that takes them, and shows it.
-    pub(super) fn take_dropped(&mut self, ctx: &Context, effects: &mut Vec<Effect>) {
+    pub(super) fn take_dropped(&mut self, ctx: &Context) {
         let dropped = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
         let mut paths: Vec<PathBuf> = dropped.iter().map(|file| file.path().to_owned()).collect();
         // A question must be answered first.
-        if self.is_asked() {
+        if self.modal.is_some() {
             return;
         }
         paths.append(&mut self.given);
         if paths.is_empty() {
             return;
         }
-        let place = self
-            .views
-            .all()
-            .into_iter()
-            .position(|view| view.take_files(&paths, &self.shared, effects));
-        if let Some(place) = place {
-            self.show(place);
-            ctx.request_repaint();
+        if self.shared.phase.is_busy() {
+            self.notices.fail(Matter::Recording, BUSY);
+        } else {
+            self.views.open_files(paths);
         }
+        self.show(ViewKind::Train);
+        ctx.request_repaint();
     }
 
     /// Shows over the window what dropping the files under the pointer will do.
     pub(super) fn dropping_ui(&self, ui: &Ui) {
         let is_hovered = ui.input(|input| !input.raw.hovered_files.is_empty());
-        if !is_hovered || self.is_asked() {
+        if !is_hovered || self.modal.is_some() {
             return;
         }
         let palette = Theme::of(ui).palette;
@@ -372,28 +366,12 @@ impl DecouplerWindow {
             StrokeKind::Inside,
         );
         let font = FontId::proportional(type_size().title);
-        let hovered = ui.input(|input| input.raw.hovered_files.clone());
-        let paths: Vec<PathBuf> = hovered.into_iter().filter_map(|file| file.path).collect();
-        let text = in_words(&paths, self.shared.phase.is_busy(), self.views.has_recording());
+        let text = if self.shared.phase.is_busy() {
+            BUSY
+        } else {
+            "Drop to open, or to add to the recording"
+        };
         painter.text(whole.center(), Align2::CENTER_CENTER, text, font, palette.text);
-    }
-}
-
-/// Returns a sentence on what dropping these files will do.
-fn in_words(paths: &[PathBuf], is_busy: bool, has_recording: bool) -> &'static str {
-    // Only their names: reading files would block the window.
-    let is_document = |path: &PathBuf| {
-        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-        extension.is_some_and(|extension| extension == "json" || extension == "checkpoint")
-    };
-    if is_busy {
-        "A training is running: stop it before you open other files"
-    } else if paths.iter().any(is_document) {
-        "Drop to open the recipe, network or checkpoint"
-    } else if has_recording {
-        "Drop to add to the recording"
-    } else {
-        "Drop to open as a recording"
     }
 }
 
@@ -401,9 +379,16 @@ fn in_words(paths: &[PathBuf], is_busy: bool, has_recording: bool) -> &'static s
 mod tests {
     use std::{fs, sync::mpsc::channel};
 
-    use decoupler_files::export::WriteError;
+    use decoupler_files::export::{WriteError, atomic_write};
 
     use super::*;
+    use crate::window::shared::FileWords;
+
+    const WORDS: FileWords = FileWords {
+        kind: "table",
+        description: "",
+        extensions: &["csv"],
+    };
 
     #[test]
     fn messages_of_the_window_system_name_no_source_file() {
@@ -426,11 +411,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [whole, broken, missing] = ["whole", "broken", "none/missing"].map(|name| folder.path().join(name));
         let message = "it is there".to_owned();
-        files.write(whole, move |path| fs::write(path, "text").map(|()| message));
-        files.write(broken.clone(), |_| -> Result<String, WriteError> { panic!("a defect") });
-        files.write(missing, |path| {
-            decoupler_files::export::atomic_write(path, |_| Ok(())).map(|()| String::new())
-        });
+        let to_write = |path: &PathBuf| ToWrite {
+            task: FileTask::save(WORDS, "table", |_| Err("unused")),
+            path: path.clone(),
+            asks: true,
+        };
+        let write = move |path: &Path| fs::write(path, "text").map(|()| message);
+        files.write(to_write(&whole), Vec::new(), write);
+        let write = |_: &Path| -> Result<String, WriteError> { panic!("a defect") };
+        files.write(to_write(&broken), Vec::new(), write);
+        let write = |path: &Path| atomic_write(path, |_| Ok(())).map(|()| String::new());
+        files.write(to_write(&missing), Vec::new(), write);
         assert_eq!(files.paths().count(), 3);
         let mut written = Vec::new();
         while written.len() < 3 {
@@ -438,16 +429,53 @@ mod tests {
             written.extend(std::iter::from_fn(|| files.next_written()));
         }
         assert_eq!(files.paths().count(), 0);
-        let has = |wanted: &dyn Fn(&Result<String, String>) -> bool| written.iter().any(wanted);
-        assert!(has(&|outcome| outcome.as_deref() == Ok("it is there")));
-        assert!(has(&|outcome| outcome
-            .as_ref()
-            .is_err_and(|reason| reason.contains("does not exist"))));
-        let name = broken.display().to_string();
-        assert!(has(&|outcome| {
-            let reason = outcome.as_ref().err();
-            reason.is_some_and(|reason| reason.contains(&name) && reason.contains("a defect"))
-        }));
+        written.sort_by_key(|(to_write, _)| {
+            [&missing, &whole, &broken]
+                .iter()
+                .position(|path| **path == to_write.path)
+        });
+        let written: Vec<_> = written.into_iter().map(|(_, written)| written).collect();
+        let [
+            Written::Failed(of_missing),
+            Written::Done(message),
+            Written::Failed(of_broken),
+        ] = &written[..]
+        else {
+            panic!("{written:?}")
+        };
+        assert!(of_missing.contains("does not exist"), "{of_missing}");
+        assert_eq!(message, "it is there");
+        assert!(of_broken.contains(&broken.display().to_string()) && of_broken.contains("a defect"));
+    }
+
+    #[test]
+    fn another_file_is_replaced_only_after_asking() {
+        let (woke, wakes) = channel();
+        let mut files = Files::new(Arc::new(move || woke.send(()).unwrap_or(())));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("table");
+        fs::write(&path, "mine").unwrap();
+        for (asks, outcome, text) in [
+            (true, Written::Exists, "mine"),
+            (false, Written::Done(String::new()), "new"),
+        ] {
+            let to_write = ToWrite {
+                task: FileTask::save(WORDS, "table", |_| Err("unused")),
+                path: path.clone(),
+                asks,
+            };
+            files.write(to_write, Vec::new(), |path| {
+                fs::write(path, "new").map(|()| String::new())
+            });
+            let (_, written) = loop {
+                wakes.recv_timeout(Duration::from_secs(60)).unwrap();
+                if let Some(written) = files.next_written() {
+                    break written;
+                }
+            };
+            assert_eq!(written, outcome);
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        }
     }
 
     #[test]
@@ -457,7 +485,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("slow");
         let mut files = Files::new(Arc::new(|| ()));
-        files.write(path.clone(), move |path| {
+        let to_write = ToWrite {
+            task: FileTask::save(WORDS, "slow", |_| Err("unused")),
+            path: path.clone(),
+            asks: true,
+        };
+        files.write(to_write, Vec::new(), move |path| {
             begun.send(()).unwrap();
             opened.recv().unwrap();
             fs::write(path, "text").map(|()| String::new())
@@ -466,19 +499,5 @@ mod tests {
         gate.send(()).unwrap();
         drop(files);
         assert_eq!(fs::read(path).unwrap(), b"text");
-    }
-
-    #[test]
-    fn the_effect_of_a_drop_depends_on_the_file_and_on_the_open_files() {
-        for (name, is_busy, has_recording, beginning) in [
-            ("press.csv", false, false, "Drop to open as a recording"),
-            ("press.csv", false, true, "Drop to add"),
-            ("net.json", false, true, "Drop to open the recipe, network"),
-            ("half.CHECKPOINT", false, false, "Drop to open the recipe, network"),
-            ("press.csv", true, false, "A training is running"),
-        ] {
-            let text = in_words(&[PathBuf::from(name)], is_busy, has_recording);
-            assert!(text.starts_with(beginning), "{name}: {text}");
-        }
     }
 }

@@ -1,15 +1,11 @@
-use eframe::egui::{
-    FontId, Frame, Id, Label, Margin, Modal, RichText, ScrollArea, TextEdit, TextStyle, Ui, WidgetInfo,
-    accesskit::Role, vec2,
-};
+use eframe::egui::{FontId, Label, RichText, ScrollArea, TextEdit, TextStyle, Ui, WidgetInfo, accesskit::Role, vec2};
 
+use super::modal::{Reply, card_ui};
 use crate::window::{
     glossary::{self, Term},
-    shared::Action,
+    shared::Offer,
     theme::{Theme, semibold, space, type_size},
-    widgets::{
-        ColumnWidth, TableCell, TableColumn, TableRow, TableView, dim_ui, ghost_button, section_heading_ui, tabs_ui,
-    },
+    widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView, dim_ui, section_heading_ui, tabs_ui},
 };
 
 /// Keys handled by the focused part of the window.
@@ -18,17 +14,16 @@ const IN_FOCUS: [(&str, &str); 8] = [
     ("Zoom a surface", "+ and −"),
     ("Reset the camera", "Home"),
     ("Reset a field to its default", "Double-click"),
-    ("Copy a value, a table or a picture", "Right click"),
+    ("Copy or export a table or a picture", "Right click"),
     ("Next control", "Tab"),
     ("Previous control", "Shift+Tab"),
     ("Close a dialog", "Escape"),
 ];
 
 /// Page of the help.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Page {
     /// The list of all keys.
-    #[default]
     Keys,
     /// The list of all terms.
     Glossary,
@@ -40,68 +35,54 @@ pub(super) enum Page {
 const NOTICES: &str = include_str!("../../../assets/NOTICES.txt");
 
 /// The open help.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Help {
-    pub(super) page: Page,
+    page: Page,
     /// Search text: only terms that contain it are displayed.
-    pub(super) typed: String,
+    typed: String,
 }
 
-/// Answer of the user to the help.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum Reply {
-    /// Close it.
-    Close,
-    /// Take the tour.
-    Tour,
+impl Help {
+    /// Opens it on this page.
+    pub(super) fn open(page: Page, typed: &str) -> Self {
+        let typed = typed.to_owned();
+        Self { page, typed }
+    }
 }
 
 /// Shows the pages of the help over the window.
-pub(super) fn help_ui(ui: &Ui, help: &mut Help, actions: &[Action]) -> Option<Reply> {
-    let mut reply = None;
-    let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
-    let modal = Modal::new(Id::unique("help")).frame(frame).show(ui.ctx(), |ui| {
-        ui.set_width(space(120));
-        ui.horizontal(|ui| {
-            let pages = [
-                (Page::Keys, "Keys"),
-                (Page::Glossary, "Glossary"),
-                (Page::About, "About"),
-            ];
-            help.page = tabs_ui(ui, "Help", &pages, help.page).unwrap_or(help.page);
-            ui.with_layout(eframe::egui::Layout::right_to_left(eframe::egui::Align::Center), |ui| {
-                let tour = ui.add(ghost_button("Take the tour"));
-                if tour.on_hover_text("Five steps through the Train view.").clicked() {
-                    reply = Some(Reply::Tour);
-                }
-            });
-        });
+pub(super) fn help_ui(ui: &Ui, help: &mut Help, offers: &[Offer]) -> Option<Reply> {
+    card_ui(ui, "help", space(120), |ui| {
+        let pages = [
+            (Page::Keys, "Keys"),
+            (Page::Glossary, "Glossary"),
+            (Page::About, "About"),
+        ];
+        help.page = tabs_ui(ui, "Help", &pages, help.page).unwrap_or(help.page);
         ui.add_space(space(2));
         match help.page {
-            Page::Keys => keys_ui(ui, actions),
+            Page::Keys => keys_ui(ui, offers),
             Page::Glossary => glossary_ui(ui, &mut help.typed),
             Page::About => about_ui(ui),
         }
-    });
-    if modal.should_close() {
-        reply = Some(Reply::Close);
-    }
-    reply
+        None
+    })
 }
 
-fn keys_ui(ui: &mut Ui, actions: &[Action]) {
+fn keys_ui(ui: &mut Ui, offers: &[Offer]) {
     let scroll = ScrollArea::vertical()
         .max_height(space(120))
         .min_scrolled_height(space(120));
     scroll.auto_shrink([false, true]).show(ui, |ui| {
         let dim = Theme::of(ui).palette.dim;
         let row = |name: &str, keys: &str| TableRow::new([TableCell::new(name), TableCell::new(keys).colour(dim)]);
-        let of_actions = actions.iter().filter_map(|action| {
-            let keys = ui.ctx().format_shortcut(&action.keys?);
-            Some(row(&action.name, &keys))
+        let of_commands = offers.iter().filter_map(|offer| {
+            let about = offer.command.about();
+            let keys = ui.ctx().format_shortcut(&about.keys?);
+            Some(row(&about.name, &keys))
         });
         let in_focus = IN_FOCUS.map(|(name, keys)| row(name, keys));
-        let rows = of_actions.chain(in_focus).collect();
+        let rows = of_commands.chain(in_focus).collect();
         let columns = [
             TableColumn::text("Action"),
             TableColumn::text("Keys").width(ColumnWidth::Rest),

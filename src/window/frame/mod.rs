@@ -1,14 +1,15 @@
 //! The window: it lays out the views, handles the events of the training and of files, and applies the effects requested
 //! by views in one place.
 
-mod actions;
 mod applying;
 mod clipboard;
 mod closing;
-mod decoupler_window;
+mod commands;
 mod events;
+mod export_dialog;
 mod files;
 mod help;
+mod modal;
 mod notices;
 #[cfg(test)]
 mod panics;
@@ -17,8 +18,8 @@ mod save_form;
 #[cfg(test)]
 mod tests;
 mod top_bar;
-mod tour;
+mod window;
 
-pub use decoupler_window::{DecouplerWindow, Desktop};
 pub use files::{OpenError, open};
 pub use remembered::WindowFile;
+pub use window::{DecouplerWindow, Desktop};

@@ -1,11 +1,15 @@
-use eframe::egui::{Align, Frame, Layout, Margin, RichText, Stroke, Ui};
+use std::time::Duration;
 
+use eframe::egui::{Align, Align2, Area, Frame, Id, Label, Layout, Margin, Order, Rect, RichText, Stroke, Ui, vec2};
+
+use super::{DecouplerWindow, files::open_folder};
 use crate::window::{
-    shared::{Matter, Notice},
-    theme::{Theme, radius},
+    shared::{Effect, Matter, Notice},
+    theme::{Theme, space},
+    training_worker::{Origin, Request},
 };
 
-/// Maximum number of notices shown at a time: they take space from the view below.
+/// Maximum number of notices shown at a time: they cover a part of the view.
 const MAX: usize = 4;
 
 /// Time after which a notice of success closes by itself, from when it was first shown.
@@ -25,7 +29,7 @@ struct Entry {
 
 impl Entry {
     fn is_done(&self) -> bool {
-        matches!(self.notice, Notice::Done(_))
+        !matches!(self.notice, Notice::Failed(_))
     }
 }
 
@@ -33,7 +37,7 @@ impl Notices {
     /// Adds a notice. A success replaces all notices about the same matter; a failure replaces only successes and an
     /// identical failure.
     pub(super) fn add(&mut self, matter: Matter, notice: Notice) {
-        let is_success = matches!(notice, Notice::Done(_));
+        let is_success = !matches!(notice, Notice::Failed(_));
         let entries = &mut self.0;
         entries.retain(|old| old.matter != matter || !(is_success || old.is_done() || old.notice == notice));
         entries.push(Entry {
@@ -68,11 +72,6 @@ impl Notices {
         self.0.last().map(|entry| &entry.notice)
     }
 
-    /// Returns all notices with their subjects.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (Matter, &Notice)> {
-        self.0.iter().map(|entry| (entry.matter, &entry.notice))
-    }
-
     /// Closes the notices that have been shown long enough at the frame time `now`. Returns the seconds until the next one
     /// closes by itself, if any.
     pub(super) fn pass(&mut self, now: f64) -> Option<f64> {
@@ -87,11 +86,11 @@ impl Notices {
 }
 
 /// Answer of the user to a notice.
-pub enum Reply {
-    /// Dismiss it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reply {
     Dismiss,
-    /// Restart the training thread.
-    Restart,
+    /// Show the folder of the file that was written.
+    OpenFolder,
     /// Connect again to the stream that has ended.
     Reconnect,
     /// Resume the training that was cut short.
@@ -101,10 +100,10 @@ pub enum Reply {
 }
 
 impl Reply {
-    fn name(&self) -> &'static str {
+    fn name(self) -> &'static str {
         match self {
             Self::Dismiss => "Dismiss",
-            Self::Restart => "Start again",
+            Self::OpenFolder => "Open folder",
             Self::Reconnect => "Try again",
             Self::Resume => "Resume",
             Self::Discard => "Discard",
@@ -112,35 +111,80 @@ impl Reply {
     }
 }
 
-/// Shows a notice in a strip above the view, a failure or a success, and a button for each of the `remedies`.
-pub fn notice_ui(ui: &mut Ui, notice: &Notice, remedies: Vec<Reply>) -> Option<Reply> {
-    let mut reply = None;
+impl DecouplerWindow {
+    /// Shows the notices over the bottom of `middle`, so that nothing moves under the pointer, and does what the user
+    /// answers.
+    pub(super) fn notices_ui(&mut self, ui: &Ui, middle: Rect, effects: &mut Vec<Effect>) {
+        if let Some(seconds) = self.notices.pass(ui.input(|input| input.time)) {
+            ui.ctx().request_repaint_after(Duration::from_secs_f64(seconds));
+        }
+        if self.notices.0.is_empty() {
+            return;
+        }
+        let can_reconnect = self.views.live.can_retry(&self.shared);
+        let mut answered = None;
+        let area = Area::new(Id::unique("notices"))
+            .order(Order::Middle)
+            .pivot(Align2::CENTER_BOTTOM);
+        let area = area.fixed_pos(middle.center_bottom() - vec2(0.0, space(2)));
+        area.show(ui.ctx(), |ui| {
+            ui.set_width(middle.width().min(space(200)) - space(4));
+            for (place, entry) in self.notices.0.iter().enumerate() {
+                // From right to left.
+                let replies: &[Reply] = match (&entry.notice, entry.matter) {
+                    (Notice::Saved(..), _) => &[Reply::Dismiss, Reply::OpenFolder],
+                    (_, Matter::Live) if can_reconnect => &[Reply::Dismiss, Reply::Reconnect],
+                    (_, Matter::CutShort) if !self.shared.phase.is_busy() => {
+                        &[Reply::Dismiss, Reply::Discard, Reply::Resume]
+                    }
+                    _ => &[Reply::Dismiss],
+                };
+                answered = notice_ui(ui, entry, replies).map(|reply| (place, reply)).or(answered);
+            }
+        });
+        let Some((place, reply)) = answered else { return };
+        match reply {
+            Reply::Dismiss => self.notices.dismiss(place),
+            Reply::OpenFolder => {
+                if let Notice::Saved(_, path) = &self.notices.0[place].notice {
+                    open_folder(path);
+                }
+            }
+            Reply::Reconnect => self.views.live.start(&self.shared, effects),
+            Reply::Resume => {
+                self.notices.settle(Matter::CutShort);
+                self.begin(Origin::Left);
+            }
+            Reply::Discard => {
+                self.notices.settle(Matter::CutShort);
+                self.worker.ask(Request::DiscardLeft);
+            }
+        }
+        ui.request_repaint();
+    }
+}
+
+/// Shows a notice, a failure or a success, with a button for each of the `replies`.
+fn notice_ui(ui: &mut Ui, entry: &Entry, replies: &[Reply]) -> Option<Reply> {
     let palette = Theme::of(ui).palette;
-    // The end of the program before is no failure of this one.
-    let is_offer = remedies.iter().any(|reply| matches!(reply, Reply::Resume));
-    let (text, colour) = match notice {
-        Notice::Done(text) => (text, palette.good),
-        Notice::Failed(text) if is_offer => (text, palette.text),
+    let (text, colour) = match &entry.notice {
+        Notice::Done(text) | Notice::Saved(text, _) => (text, palette.good),
+        // The end of the program before is no failure of this one.
+        Notice::Failed(text) if entry.matter == Matter::CutShort => (text, palette.text),
         Notice::Failed(text) => (text, palette.bad),
     };
-    let frame = Frame::new()
-        .fill(palette.panel)
-        .stroke(Stroke::new(1.0, colour))
-        .corner_radius(radius())
-        .inner_margin(Margin::symmetric(12, 6));
-    frame.show(ui, |ui| {
+    let frame = Frame::popup(ui.style()).stroke(Stroke::new(1.0, colour));
+    let mut reply = None;
+    frame.inner_margin(Margin::symmetric(12, 6)).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                if ui.button(Reply::Dismiss.name()).clicked() {
-                    reply = Some(Reply::Dismiss);
-                }
-                for remedy in remedies {
-                    if ui.button(remedy.name()).clicked() {
-                        reply = Some(remedy);
+                for other in replies {
+                    if ui.button(other.name()).clicked() {
+                        reply = Some(*other);
                     }
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                    ui.add(eframe::egui::Label::new(RichText::new(text).color(colour)).wrap());
+                    ui.add(Label::new(RichText::new(text).color(colour)).wrap());
                 });
             });
         });
@@ -155,7 +199,7 @@ mod tests {
     fn texts(notices: &Notices) -> Vec<&str> {
         let all = notices.0.iter();
         all.map(|entry| match &entry.notice {
-            Notice::Done(text) | Notice::Failed(text) => text.as_str(),
+            Notice::Done(text) | Notice::Saved(text, _) | Notice::Failed(text) => text.as_str(),
         })
         .collect()
     }

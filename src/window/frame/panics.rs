@@ -8,7 +8,7 @@ use crate::{
     driver::{Driver, small},
     window::{
         job::planned_panic::{MESSAGE, is_pending, plan},
-        shared::{Effect, Notice, Phase, View as _},
+        shared::{Effect, Notice, Phase},
     },
 };
 
@@ -45,7 +45,7 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     assert_eq!(driver.state().phase, Phase::Idle);
     panics(&mut driver, "preview", |driver| driver.click("10×8"));
     driver.configure_small();
-    panics(&mut driver, "ready network", |driver| {
+    panics(&mut driver, "demo network", |driver| {
         driver.act("Press the middle of the surface");
     });
     driver.press(Key::Escape);
@@ -62,8 +62,7 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
         driver.harness().run_steps(2);
     };
     panics(&mut driver, "comparison", |driver| press(driver, 0.5));
-    panics(&mut driver, "fits", |driver| press(driver, 0.6));
-    press(&mut driver, 0.7);
+    press(&mut driver, 0.6);
     driver.wait("the other decoders", |driver| {
         answered(driver) && !driver.says("internal error")
     });
@@ -74,13 +73,6 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     assert!(!table.exists());
     driver.save("Error table, CSV", &table);
     assert!(table.exists());
-
-    panics(&mut driver, "path", |driver| {
-        driver.export("Error table, CSV");
-        driver.type_into("File", &table.display().to_string());
-        driver.click_button("Save");
-    });
-    driver.press(Key::Escape);
 
     panics(&mut driver, "past network", |driver| {
         driver.get("Epoch of the displayed network").focus();
@@ -112,7 +104,6 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
 fn a_press_on_a_large_array_is_answered_again_after_a_panic() {
     let mut driver = Driver::open();
     let mut settings = small();
-    // Answers of smaller arrays need no job.
     settings.simulation_mut().unwrap().sensor.scale = "100x60_3x180".parse().unwrap();
     let simulation = settings.simulation_mut().unwrap();
     (simulation.samples, simulation.test_samples) = (2, 1);
@@ -139,27 +130,23 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
     driver.wait_for_kept_run();
 
     panics(&mut driver, "identifiability", |driver| {
-        driver.click_button("Identifiability");
+        driver.click_button("Sensor");
     });
     driver.enter("Height", "8");
-    driver.wait("the analysis", |driver| {
-        driver.views().identifiability.analysis.is_some()
-    });
+    driver.wait("the analysis", |driver| driver.says("Condition number: "));
     panics(&mut driver, "clipboard", |driver| {
-        driver.act("Copy singular values as a picture");
+        driver.choose_export("Singular values, Copy");
+        driver.click_button("Copy");
     });
-    driver.act("Copy singular values as a picture");
+    driver.choose_export("Singular values, Copy");
+    driver.click_button("Copy");
     driver.wait("the picture", |driver| matches!(driver.notice(), Some(Notice::Done(_))));
 
-    driver.click_button("Trade-off");
-    panics(&mut driver, "trade-off", |driver| driver.click("▶ Measure"));
-    assert!(driver.is_enabled("▶ Measure"));
-
-    driver.click_button("Experiments");
-    panics(&mut driver, "experiments", |driver| driver.click("▶ Run"));
+    driver.click_button("Study");
+    panics(&mut driver, "study", |driver| driver.click("▶ Run"));
     assert!(driver.is_enabled("▶ Run"));
     driver.click("Sweep");
-    panics(&mut driver, "sweep folder", |driver| {
+    panics(&mut driver, "study", |driver| {
         driver.open_form("Open sweep folder…");
         driver.type_into("File", "nowhere");
         driver.click_button("Open");
@@ -167,11 +154,11 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
 
     driver.click_button("Live");
     panics(&mut driver, "live", |driver| driver.click("▶ Start"));
-    panics(&mut driver, "sample", |driver| {
+    panics(&mut driver, "network file", |driver| {
         driver.click("Play the sample recording");
     });
     driver.click("▶ Start");
-    driver.wait("a frame", |driver| driver.has("Live decoupled surface"));
+    driver.wait("a frame", |driver| driver.has("Live decoded surface"));
     driver.click("■ Stop");
     panics(&mut driver, "network file", |driver| {
         driver.open_form("Open network file…");
@@ -188,17 +175,16 @@ fn jobs_of_a_recording_can_be_started_again_after_a_panic() {
     fs::write(&path, format!("time (s),u (V),d (mm)\n{}", String::from_iter(rows))).unwrap();
     let mut driver = Driver::open();
     let open = |driver: &mut Driver| {
-        let mut effects = Vec::new();
-        let window = driver.window_mut();
-        let (view, shared) = (&mut window.views.train, &window.shared);
-        assert!(view.take_files(std::slice::from_ref(&path), shared, &mut effects));
+        driver.window_mut().views.open_files(vec![path.clone()]);
         driver.harness().step();
     };
-    panics(&mut driver, "opening", open);
-    panics(&mut driver, "import", open);
-    driver.click_button("Identifiability");
-    panics(&mut driver, "recording study", |driver| driver.act("Analyse readings"));
-    driver.act("Analyse readings");
+    panics(&mut driver, "recording", open);
+    open(&mut driver);
+    driver.wait("the samples", |driver| driver.says("Test: "));
+    driver.click_button("Study");
+    driver.click("What the readings determine");
+    panics(&mut driver, "study", |driver| driver.act("Begin the study"));
+    driver.act("Begin the study");
     driver.wait("the findings", |driver| driver.says("R²"));
 }
 

@@ -1,6 +1,7 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    sync::Arc,
     time::Duration,
 };
 
@@ -38,9 +39,6 @@ pub(super) struct Remembered {
     /// The theme, if the user has chosen one.
     #[serde(deserialize_with = "if_readable")]
     pub(super) is_dark: Option<bool>,
-    /// True once the user has ended the tour.
-    #[serde(deserialize_with = "if_readable")]
-    pub(super) has_toured: Option<bool>,
     /// Colours of values, if the user has chosen them.
     #[serde(deserialize_with = "if_readable")]
     pub(super) colours: Option<SequentialMap>,
@@ -61,7 +59,7 @@ pub(super) struct Remembered {
     pub(super) is_auto: Option<bool>,
     /// Plan of the recording that is open, with absolute paths.
     #[serde(deserialize_with = "if_readable")]
-    pub(super) plan: Option<Plan>,
+    pub(super) plan: Option<OpenPlan>,
     /// Width and height of the window.
     #[serde(deserialize_with = "if_readable")]
     pub(super) size_points: Option<[f32; 2]>,
@@ -143,6 +141,29 @@ impl Remembered {
     /// Remembers the size of a window.
     pub(super) fn take_size_points(&mut self, size: [f32; 2]) {
         self.size_points = Some(size.map(f32::round));
+    }
+}
+
+/// The plan of the open recording. It is shared with the settings of the next training, so that a frame neither copies nor
+/// compares it.
+#[derive(Clone, Debug)]
+pub(super) struct OpenPlan(pub(super) Arc<Plan>);
+
+impl PartialEq for OpenPlan {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0) || self.0 == other.0
+    }
+}
+
+impl Serialize for OpenPlan {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for OpenPlan {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Plan::deserialize(deserializer).map(|plan| Self(Arc::new(plan)))
     }
 }
 
@@ -247,20 +268,6 @@ impl DecouplerWindow {
     /// Remembers what the user sees.
     pub(super) fn remember(&mut self) {
         let Some(memory) = &mut self.memory else { return };
-        self.remembered.view = Some(self.names[self.shown].1.to_owned());
-        self.remembered.draft = Some(self.shared.draft);
-        self.remembered.source = Some(self.shared.source);
-        self.remembered.recording = Some(self.shared.recording.settings);
-        self.remembered.is_auto = Some(self.shared.recording.is_auto);
-        match &self.shared.recording.plan {
-            Ok(plan) if self.remembered.plan.as_ref() != Some(&**plan) => {
-                self.remembered.plan = Some(Plan::clone(plan));
-            }
-            Ok(_) => {}
-            // An import that is incomplete now may be completed later.
-            Err(_) if self.views.has_recording() => {}
-            Err(_) => self.remembered.plan = None,
-        }
         let (is_usual_size, is_held) = self.ctx.input(|input| {
             let viewport = input.viewport();
             let is_unusual = [viewport.maximized, viewport.fullscreen, viewport.minimized].contains(&Some(true));
@@ -268,18 +275,28 @@ impl DecouplerWindow {
         });
         if is_usual_size {
             let size = self.ctx.content_rect().size() * self.ctx.zoom_factor();
-            self.remembered.take_size_points(size.into());
+            self.chosen.take_size_points(size.into());
         }
+        let shared = &self.shared;
+        let latest = Remembered {
+            view: Some(shared.shown.name().to_owned()),
+            draft: Some(shared.draft),
+            source: Some(shared.source),
+            recording: Some(shared.recording.settings),
+            is_auto: Some(shared.recording.is_auto),
+            plan: match &shared.recording.plan {
+                Ok(plan) => Some(OpenPlan(Arc::clone(plan))),
+                // An import that is incomplete now may be completed later.
+                Err(_) if self.views.has_recording() => memory.latest.plan.take(),
+                Err(_) => None,
+            },
+            ..self.chosen.clone()
+        };
         // A drag is written when it ends.
-        memory.keep(self.remembered.clone(), !is_held);
+        memory.keep(latest, !is_held);
         if let Some(reason) = memory.next_failure() {
             self.notices.fail(Matter::Memory, reason);
         }
-    }
-
-    pub(super) fn place_of(&self, view: Option<&str>) -> Option<usize> {
-        let mut names = self.names.iter();
-        names.find_map(|&(place, name)| (Some(name) == view).then_some(place))
     }
 }
 

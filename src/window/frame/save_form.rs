@@ -1,15 +1,15 @@
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use eframe::egui::{
-    Align, Context, Frame, Id, Key, Layout, Margin, Modal, RichText, TextEdit, Ui,
+    Align, Id, Key, Layout, RichText, TextEdit, Ui,
     text::{CCursor, CCursorRange},
     text_edit::TextEditState,
 };
 
-use super::files::Found;
+use super::modal::{Reply, card_ui};
 use crate::window::{
     shared::FileTask,
-    theme::{Theme, semibold, space, type_size},
+    theme::{semibold, space, type_size},
     widgets::{dim_ui, ghost_button, note_ui, primary_button},
 };
 
@@ -20,41 +20,28 @@ pub struct Saving {
     pub task: FileTask,
     /// The path typed so far.
     pub path: String,
-    stage: Stage,
+    /// Outcome for this path, if it was tried.
+    pub tried: Option<Tried>,
+    is_new: bool,
 }
 
-/// State of the path entry.
+/// Reasons why a file is not written at the typed path at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Stage {
-    /// The form has just opened.
-    Opening,
-    /// The path is being typed.
-    Typing,
-    /// The path is being checked.
-    Checking,
+pub enum Tried {
     /// Another file exists there, and the user is asked whether to replace it.
-    Asking,
+    Exists,
     /// Nothing may be saved there, with the reason.
     Refused(String),
 }
 
-/// Answer of the user to the form.
-pub enum Reply {
-    /// Use this path.
-    Path(PathBuf),
-    /// Use this path and replace the file there.
-    Replace(PathBuf),
-    /// Cancel.
-    Cancel,
-}
-
 impl Saving {
     /// The task, with a path that typing replaces.
-    pub fn new(task: FileTask, path: String) -> Self {
+    pub fn new(task: FileTask, path: String, tried: Option<Tried>) -> Self {
         Self {
             task,
             path,
-            stage: Stage::Opening,
+            tried,
+            is_new: true,
         }
     }
 
@@ -62,58 +49,33 @@ impl Saving {
     fn path(&self) -> PathBuf {
         PathBuf::from(self.path.trim())
     }
-
-    /// Waits for the check of the path.
-    pub(super) fn wait_for_check(&mut self) {
-        self.stage = Stage::Checking;
-    }
-
-    /// The path, while it is being checked.
-    pub(super) fn checked_path(&self) -> Option<PathBuf> {
-        (self.stage == Stage::Checking).then(|| self.path())
-    }
-
-    /// Takes the result of checking a path; returns true if the file can be written there without a question.
-    pub(super) fn take(&mut self, path: &Path, found: Found) -> bool {
-        // Another path may have been typed since.
-        if self.stage != Stage::Checking || self.path() != path {
-            return false;
-        }
-        match found {
-            Found::Nothing => return true,
-            Found::File => self.stage = Stage::Asking,
-            Found::InUse(reason) => self.stage = Stage::Refused(reason),
-        }
-        false
-    }
 }
 
-/// Asks for the path of a file inside the window: for desktops that offer no file dialog, and for typing.
-pub fn save_form_ui(ui: &mut Ui, saving: &mut Saving) -> Option<Reply> {
-    let mut reply = None;
-    let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
-    let modal = Modal::new(Id::unique("save form")).frame(frame).show(ui.ctx(), |ui| {
-        ui.set_width(space(110));
-        let task = &saving.task;
-        let title = format!("{} {}", task.verb(), task.words.kind);
-        ui.label(RichText::new(title).font(semibold(type_size().title)));
-        let dim = Theme::of(ui).palette.dim;
-        ui.label(RichText::new(task.words.description).size(type_size().note).color(dim));
+/// Asks for the path of a file inside the window, for desktops that offer no file dialog.
+pub(super) fn save_form_ui(ui: &mut Ui, saving: &mut Saving) -> Option<Reply> {
+    card_ui(ui, "save form", space(110), |ui| {
+        ui.label(RichText::new(saving.task.title()).font(semibold(type_size().title)));
+        dim_ui(ui, saving.task.words.description);
         ui.add_space(space(2));
         let has_entered = path_ui(ui, saving);
+        match &saving.tried {
+            Some(Tried::Refused(reason)) => {
+                note_ui(ui, &format!("{reason}."));
+            }
+            Some(Tried::Exists) => {
+                let path = saving.path();
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                let text = format!("{name} already exists. Replacing it deletes its contents.");
+                note_ui(ui, &text);
+            }
+            None => {}
+        }
         ui.add_space(space(3));
-        reply = match &saving.stage {
-            Stage::Asking => question_ui(ui, saving),
-            _ => buttons_ui(ui, saving, has_entered),
-        };
-    });
-    if modal.should_close() {
-        reply = Some(Reply::Cancel);
-    }
-    reply
+        buttons_ui(ui, saving, has_entered)
+    })
 }
 
-/// The field for the path, with notes about it. Returns true if Enter was pressed in it.
+/// The field for the path. Returns true if Enter was pressed in it.
 fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     let label = ui.label("File");
     let id = Id::unique("path of a file");
@@ -121,68 +83,46 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     let edit = ui.add(edit.desired_width(f32::INFINITY)).labelled_by(label.id);
     let has_entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     // Typing and Enter are enough; Tab still reaches the buttons.
-    if ui.memory(|memory| memory.focused().is_none()) {
+    let is_new = std::mem::take(&mut saving.is_new);
+    if is_new || ui.memory(|memory| memory.focused().is_none()) {
         edit.request_focus();
     }
-    if saving.stage == Stage::Opening {
-        select_all(ui.ctx(), id, &saving.path);
-        saving.stage = Stage::Typing;
+    if is_new {
+        // Typing replaces the whole path.
+        let mut state = TextEditState::load(ui.ctx(), id).unwrap_or_default();
+        let whole = CCursorRange::two(CCursor::new(0), CCursor::new(saving.path.chars().count()));
+        state.cursor.set_char_range(Some(whole));
+        state.store(ui.ctx(), id);
     }
     if edit.changed() {
-        saving.stage = Stage::Typing;
-    }
-    match &saving.stage {
-        Stage::Refused(reason) => {
-            note_ui(ui, &format!("{reason}."));
-        }
-        Stage::Asking => {
-            let name = saving.path();
-            let name = name.file_name().unwrap_or(name.as_os_str()).to_string_lossy();
-            note_ui(
-                ui,
-                &format!("{name} already exists. Replacing it deletes its contents."),
-            );
-        }
-        Stage::Checking => {
-            dim_ui(ui, "Checking whether a file of this name exists…");
-        }
-        Stage::Opening | Stage::Typing => {}
+        saving.tried = None;
     }
     has_entered
 }
 
-/// Selects the whole path, so that typing replaces it.
-fn select_all(ctx: &Context, id: Id, path: &str) {
-    let mut state = TextEditState::load(ctx, id).unwrap_or_default();
-    let whole = CCursorRange::two(CCursor::new(0), CCursor::new(path.chars().count()));
-    state.cursor.set_char_range(Some(whole));
-    state.store(ctx, id);
-}
-
 fn buttons_ui(ui: &mut Ui, saving: &Saving, has_entered: bool) -> Option<Reply> {
     let mut reply = None;
+    if saving.tried == Some(Tried::Exists) {
+        // Where the button to save was, a second click or Enter does nothing.
+        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+            if ui.add(ghost_button("Replace")).clicked() {
+                reply = Some(Reply::Path(saving.path(), false));
+            }
+            if ui.add(ghost_button("Cancel")).clicked() {
+                reply = Some(Reply::Close);
+            }
+        });
+        return reply;
+    }
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        let may_go = !saving.path.trim().is_empty() && saving.stage == Stage::Typing;
-        let is_clicked = ui.add_enabled(may_go, primary_button(saving.task.verb())).clicked();
-        if is_clicked || (has_entered && may_go) {
-            reply = Some(Reply::Path(saving.path()));
+        let is_named = !saving.path.trim().is_empty();
+        let name = if saving.task.is_read() { "Open" } else { "Save" };
+        let save = ui.add_enabled(is_named, primary_button(name));
+        if is_named && (save.clicked() || has_entered) {
+            reply = Some(Reply::Path(saving.path(), true));
         }
         if ui.add(ghost_button("Cancel")).clicked() {
-            reply = Some(Reply::Cancel);
-        }
-    });
-    reply
-}
-
-/// Asks whether to replace the file. Where the button to save was, a second click or Enter does nothing.
-fn question_ui(ui: &mut Ui, saving: &Saving) -> Option<Reply> {
-    let mut reply = None;
-    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-        if ui.add(ghost_button("Replace")).clicked() {
-            reply = Some(Reply::Replace(saving.path()));
-        }
-        if ui.add(ghost_button("Cancel")).clicked() {
-            reply = Some(Reply::Cancel);
+            reply = Some(Reply::Close);
         }
     });
     reply

@@ -10,11 +10,9 @@ use std::{
 
 use eframe::egui::Context;
 
-use super::{DecouplerWindow, Desktop, files::Found, save_form::Saving};
+use super::{DecouplerWindow, Desktop};
 use crate::window::{
-    preview::PreviewEvent,
-    shared::{Contents, Effect, FileTask, FileWords, Matter, Notice, Phase},
-    test_view::TestView,
+    shared::{Effect, FileTask, FileWords, Matter, Notice, Phase, saying_saved},
     training_worker::Worker,
 };
 use decoupler_files::export::NetworkFile;
@@ -84,7 +82,7 @@ impl DerefMut for Opened {
 /// Saves the displayed network.
 fn export(window: &mut DecouplerWindow, path: PathBuf) {
     let task = save_task(window);
-    window.answer(task, path);
+    window.answer(task, path, false);
 }
 
 /// Returns the task of saving the displayed network.
@@ -95,9 +93,9 @@ fn save_task(window: &DecouplerWindow) -> FileTask {
         extensions: &["json"],
     };
     let run = window.shared.run.as_ref().unwrap().id;
-    FileTask::save_run(words, "network", run, |run| {
-        let file = run.network_file()?;
-        Ok(Contents::new(move |path| file.save(path)))
+    FileTask::of_run(words, "network", Some(run), |run| {
+        let file = run.unwrap().network_file()?;
+        Ok(saying_saved(move |path| file.save(path)))
     })
 }
 
@@ -149,15 +147,6 @@ fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
 }
 
 #[test]
-fn a_test_set_drawn_late_does_not_hide_the_training_that_shows_it() {
-    let mut window = Opened::trained();
-    let settings = window.shared.draft;
-    let drawn = TestView::draw(&settings);
-    window.take_preview(PreviewEvent::Drawn(Box::new(settings), drawn));
-    assert!(window.shared.preview.is_none() && window.shared.result().is_some());
-}
-
-#[test]
 fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.json");
@@ -177,7 +166,7 @@ fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
     window.wait(|window| window.notice().is_some());
     assert_eq!(
         window.notice(),
-        Some(&Notice::Done(format!("Saved {}", path.display())))
+        Some(&Notice::Saved(format!("Saved {}", path.display()), path.clone()))
     );
     let file = NetworkFile::load(&path).unwrap();
     assert_eq!(file.settings.hidden, shown.hidden);
@@ -197,7 +186,7 @@ fn a_file_asked_for_before_another_training_began_is_refused_not_written_about_t
     window.wait(|window| {
         matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings().hidden == 4
     });
-    window.answer(task, path.clone());
+    window.answer(task, path.clone(), false);
     window.wait(|window| window.notice().is_some());
     let Some(Notice::Failed(reason)) = window.notice() else {
         panic!("{:?}", window.notice())
@@ -223,17 +212,4 @@ fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
             .test()
             .is_some_and(|test| test.sensor == impossible.simulation().unwrap().sensor)
     });
-}
-
-#[test]
-fn closing_waits_for_a_file_whose_path_is_being_checked() {
-    let mut window = Opened::trained();
-    let path = PathBuf::from("table.csv");
-    let mut saving = Saving::new(save_task(&window), path.display().to_string());
-    saving.wait_for_check();
-    window.saving = Some(saving);
-    assert_eq!(window.awaited_files(), std::slice::from_ref(&path));
-    let saving = window.saving.as_mut().unwrap();
-    assert!(!saving.take(&path, Found::File), "the user is asked");
-    assert!(window.awaited_files().is_empty());
 }

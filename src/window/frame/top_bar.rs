@@ -1,17 +1,16 @@
-//! The top bar with the Export menu of the current view, and the widths of the columns below it.
+//! The top bar, and the widths of the columns below it.
 
 use std::ops::RangeInclusive;
 
 use eframe::egui::{
-    Align, Button, CursorIcon, Frame, Id, Label, Layout, Margin, Rect, RichText, ScrollArea, Sense, Stroke,
-    TextWrapMode, Ui, Vec2, WidgetInfo, accesskit::Role, containers::menu::MenuButton,
+    Align, CursorIcon, Id, Label, Layout, Rect, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,
 };
 
 use super::remembered::Remembered;
 use crate::window::{
-    shared::{Action, Ask, Columns, Effect, Export},
+    shared::{Columns, Command, Offer, ViewKind},
     theme::{Theme, semibold, space, type_size},
-    widgets::{Landmark, ghost_button, section_heading_ui, segmented_ui},
+    widgets::{ghost_button, segmented_ui},
 };
 
 /// Width from which everything fits, in points.
@@ -23,27 +22,14 @@ const TIGHT: f32 = 1100.0;
 /// Width below which the mark is left out.
 const NARROW: f32 = 1000.0;
 
-/// Names of the actions that change the theme.
-pub(super) const LIGHT: &str = "Light theme";
-pub(super) const DARK: &str = "Dark theme";
-
-/// Click of the user in the top bar.
-pub(super) enum Reach {
-    /// The view in this place.
-    View(usize),
-    /// The action of this name.
-    Action(String),
-}
-
 /// Name, views, and the tools of the displayed view, which `tools_ui` lays out from right to left, before the tools of the
-/// window itself.
+/// window itself. Returns the command that the user clicked.
 pub(super) fn top_bar_ui(
     ui: &mut Ui,
-    views: &[(usize, &str)],
-    shown: usize,
-    actions: &[Action],
+    shown: ViewKind,
+    offers: &[Offer],
     tools_ui: impl FnOnce(&mut Ui),
-) -> Option<Reach> {
+) -> Option<Command> {
     ui.horizontal_centered(|ui| {
         ui.add_space(space(1));
         let width = ui.available_width();
@@ -61,27 +47,25 @@ pub(super) fn top_bar_ui(
             if width < TIGHT {
                 ui.spacing_mut().button_padding.x = space(1);
             }
-            segmented_ui(ui, "View", views, shown, false)
+            let views = ViewKind::ALL.map(|view| (view, view.name()));
+            segmented_ui(ui, "View", &views, shown, false)
         };
-        let picked = ui.scope(views_ui).inner.map(Reach::View);
+        let picked = ui.scope(views_ui).inner.map(Command::Show);
         let reached = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let mut reached = None;
-            let mut button_ui = |ui: &mut Ui, name: &str, text: &str| {
-                reached = reached.take().or(action_button_ui(ui, actions, name, text));
+            let mut button_ui = |ui: &mut Ui, command: Command, text: &str| {
+                reached = reached.take().or(command_button_ui(ui, offers, command, text));
             };
-            button_ui(ui, "Keys", "?");
-            if is_wide {
-                let (text, name) = if Theme::of(ui).is_dark {
-                    ("Light", LIGHT)
-                } else {
-                    ("Dark", DARK)
-                };
-                button_ui(ui, name, text);
+            button_ui(ui, Command::Keys, "?");
+            if is_wide && Theme::of(ui).is_dark {
+                button_ui(ui, Command::Light, "Light");
+            } else if is_wide {
+                button_ui(ui, Command::Dark, "Dark");
             }
-            button_ui(ui, "Search actions", if is_wide { "Search" } else { "…" });
+            button_ui(ui, Command::Search, if is_wide { "Search" } else { "…" });
             if is_wide {
-                button_ui(ui, "Redo change of settings", "↻");
-                button_ui(ui, "Undo change of settings", "↺");
+                button_ui(ui, Command::Redo, "↻");
+                button_ui(ui, Command::Undo, "↺");
                 ui.add_space(space(2));
             }
             tools_ui(ui);
@@ -92,16 +76,18 @@ pub(super) fn top_bar_ui(
     .inner
 }
 
-/// A small button for an action of the window, with its name and its keys under the pointer.
-fn action_button_ui(ui: &mut Ui, actions: &[Action], name: &str, text: &str) -> Option<Reach> {
-    let action = actions.iter().find(|action| action.name == name)?;
-    let keys = action.keys.map(|keys| ui.ctx().format_shortcut(&keys));
-    let hint = keys.map_or_else(|| format!("{name}."), |keys| format!("{name} ({keys})."));
-    let button = ui.add_enabled(action.is_possible, ghost_button(text));
-    let is_possible = action.is_possible;
-    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, name));
+/// A small button for a command of the window, with its name and its keys under the pointer.
+fn command_button_ui(ui: &mut Ui, offers: &[Offer], command: Command, text: &str) -> Option<Command> {
+    let is_possible = offers.iter().any(|offer| offer.command == command && offer.is_possible);
+    let about = command.about();
+    let hint = match about.keys {
+        Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
+        None => format!("{}.", about.name),
+    };
+    let button = ui.add_enabled(is_possible, ghost_button(text));
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &about.name));
     let button = button.on_hover_text(&hint).on_disabled_hover_text(&hint);
-    button.clicked().then(|| Reach::Action(name.to_owned()))
+    button.clicked().then_some(command)
 }
 
 fn mark_ui(ui: &mut Ui) {
@@ -117,105 +103,6 @@ fn mark_ui(ui: &mut Ui) {
         painter.vline(inner.left() + share * inner.width(), inner.y_range(), stroke);
     }
     painter.circle_filled(inner.center(), 3.5, theme.palette.accent);
-}
-
-const WIDTH: f32 = space(88);
-
-/// The button that opens the menu. `exports` lists the exports; it is called only while the menu is open.
-pub(super) fn export_menu_ui<'a>(ui: &mut Ui, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
-    let (button, _) = MenuButton::from_button(ghost_button("Export")).ui(ui, |ui| {
-        // A menu taller than the window scrolls.
-        let most = ui.ctx().content_rect().height() - space(20);
-        let scroll = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
-        let margin = Margin {
-            left: 8,
-            right: 8,
-            top: 0,
-            bottom: 8,
-        };
-        scroll.show(ui, |ui| {
-            Frame::new().inner_margin(margin).show(ui, |ui| {
-                // A menu justifies its lines, and shows buttons as text.
-                ui.with_layout(Layout::top_down(Align::Min), |ui| {
-                    ui.set_width(WIDTH);
-                    ui.visuals_mut().widgets.inactive.weak_bg_fill = Theme::of(ui).palette.raised;
-                    let asked = exports_ui(ui, exports());
-                    effects.extend(asked.map(|ask| ask()));
-                });
-            });
-        });
-    });
-    Landmark::Export.stands_at(ui, button.rect);
-    button.on_hover_text("Networks, reports, figures and tables of this view, as files or to the clipboard.");
-}
-
-/// One line for each item, with a button for each of its forms. Consecutive items that are unavailable for the same reason
-/// show it once. Returns the requested export.
-fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
-    let mut asked = None;
-    let mut last_reason = String::new();
-    let mut group = None;
-    let mut exports = gathered(exports).into_iter().peekable();
-    while let Some(first) = exports.next() {
-        if group.replace(first.group) != Some(first.group) {
-            section_heading_ui(ui, &first.group.heading());
-        }
-        let reason = first.ask.as_ref().err().cloned().unwrap_or_default();
-        if reason != last_reason && !reason.is_empty() {
-            let text = RichText::new(&reason).size(type_size().note);
-            ui.label(text.color(Theme::of(ui).palette.dim));
-        }
-        last_reason = reason;
-        let name = first.name.clone();
-        let mut forms = vec![first];
-        while let Some(next) = exports.next_if(|next| next.group == forms[0].group && next.name == name) {
-            forms.push(next);
-        }
-        ui.horizontal(|ui| {
-            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
-            ui.set_min_height(space(6));
-            let colour = if forms[0].ask.is_ok() {
-                Theme::of(ui).palette.text
-            } else {
-                Theme::of(ui).palette.dim
-            };
-            ui.label(RichText::new(name).color(colour));
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                // From right to left.
-                for form in forms.into_iter().rev() {
-                    asked = asked.take().or(form_ui(ui, form));
-                }
-            });
-        });
-    }
-    asked
-}
-
-/// Returns the exports grouped, with the groups in order of their first export: each has one heading.
-fn gathered(mut exports: Vec<Export<'_>>) -> Vec<Export<'_>> {
-    let mut groups = Vec::new();
-    for export in &exports {
-        if !groups.contains(&export.group) {
-            groups.push(export.group);
-        }
-    }
-    exports.sort_by_key(|export| groups.iter().position(|group| *group == export.group));
-    exports
-}
-
-/// The button of one form. Returns the request if it was clicked.
-fn form_ui<'a>(ui: &mut Ui, export: Export<'a>) -> Option<Ask<'a>> {
-    let (label, is_there) = (export.label(), export.ask.is_ok());
-    let button = ui.add_enabled(is_there, Button::new(&export.form));
-    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_there, &label));
-    let button = button.on_hover_text(export.description);
-    match export.ask {
-        Ok(ask) => button.clicked().then_some(ask),
-        Err(reason) => {
-            button.on_disabled_hover_text(reason);
-            None
-        }
-    }
 }
 
 /// Widths of the column on the left at which its names do not touch their values.
@@ -278,34 +165,6 @@ pub(super) fn edge_ui(ui: &Ui, label: &str, panel: Rect, is_left: bool, width: &
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::window::shared::ExportGroup;
-
-    #[test]
-    fn each_group_has_one_heading_and_keeps_the_order_of_its_exports() {
-        let export = |(group, name): (ExportGroup, &str)| Export {
-            group,
-            name: name.to_owned(),
-            form: String::new(),
-            description: "",
-            ask: Err(String::new()),
-        };
-        let exports = [
-            (ExportGroup::Network, "network"),
-            (ExportGroup::Tables, "errors"),
-            (ExportGroup::Copies, "errors"),
-            (ExportGroup::Tables, "channels"),
-            (ExportGroup::Copies, "channels"),
-            (ExportGroup::Training, "checkpoint"),
-        ];
-        let gathered = gathered(exports.map(export).into());
-        let found: Vec<_> = gathered
-            .iter()
-            .map(|export| (export.group, export.name.as_str()))
-            .collect();
-        let [network, errors, copied_errors, channels, copied_channels, checkpoint] = exports;
-        let expected = [network, errors, channels, copied_errors, copied_channels, checkpoint];
-        assert_eq!(found, expected);
-    }
 
     fn widths(form: Option<f32>, report: Option<f32>, window: f32) -> [f32; 2] {
         let columns = Columns {

@@ -44,11 +44,8 @@ pub(super) struct Background<E> {
     wake: Wake,
     /// True for long computations, which run at lower priority than the window.
     yields: bool,
-    newest: Option<Piece<E>>,
-}
-
-struct Piece<E> {
-    mailbox: Arc<Mailbox<E>>,
+    /// Events of the newest task.
+    newest: Option<Arc<Mailbox<E>>>,
     thread: Option<JoinHandle<()>>,
     is_abandoned: bool,
 }
@@ -62,6 +59,8 @@ impl<E: Send + 'static> Background<E> {
             wake,
             yields: true,
             newest: None,
+            thread: None,
+            is_abandoned: false,
         }
     }
 
@@ -83,9 +82,12 @@ impl<E: Send + 'static> Background<E> {
     ) {
         self.cancel();
         let (name, yields) = (self.name, self.yields);
-        let before = self.newest.take().map(|piece| piece.mailbox);
         let mailbox = Arc::new(Mailbox::new());
-        let report = || Report::new(Arc::clone(&mailbox), Arc::clone(&self.wake));
+        let before = self.newest.replace(Arc::clone(&mailbox));
+        let report = || Report {
+            mailbox: Arc::clone(&mailbox),
+            wake: Arc::clone(&self.wake),
+        };
         let [in_work, at_end] = [report(), report()];
         #[cfg(test)]
         let work = planned_panic::before(name, work);
@@ -98,61 +100,54 @@ impl<E: Send + 'static> Background<E> {
             }
             work(&in_work)
         };
-        let thread = match start_thread(name, run, move |result| at_end.end(last(result))) {
-            Ok(thread) => Some(thread),
-            Err(error) => {
-                report().end(last(Err(error)));
-                None
-            }
-        };
-        self.newest = Some(Piece {
-            mailbox,
-            thread,
-            is_abandoned: false,
-        });
+        let thread = start_thread(name, run, move |result| at_end.end(last(result)));
+        self.is_abandoned = false;
+        self.thread = thread.map_err(|error| report().end(last(Err(error)))).ok();
     }
 }
 
 impl<E> Background<E> {
     /// Returns the next event, if one has arrived.
     pub(super) fn next_event(&self) -> Option<E> {
-        self.mailbox()?.next_event()
+        self.mailbox()?.inside().events.pop_front()
     }
 
     /// Returns true while more events are expected.
     pub(super) fn is_under_way(&self) -> bool {
-        self.mailbox().is_some_and(Mailbox::has_more)
+        self.mailbox().is_some_and(|mailbox| {
+            let inside = mailbox.inside();
+            !inside.has_ended || !inside.events.is_empty()
+        })
     }
 
     /// Asks the work to end. Its remaining events are received.
     pub(super) fn cancel(&self) {
-        if let Some(piece) = &self.newest {
-            piece.mailbox.cancel();
+        if let Some(mailbox) = &self.newest {
+            mailbox.is_cancelled.store(true, Ordering::Relaxed);
         }
     }
 
     /// Asks the work to end. Its remaining events are discarded.
     pub(super) fn abandon(&mut self) {
         self.cancel();
-        if let Some(piece) = &mut self.newest {
-            piece.is_abandoned = true;
-        }
+        self.is_abandoned = true;
+    }
+
+    fn mailbox(&self) -> Option<&Arc<Mailbox<E>>> {
+        self.newest.as_ref().filter(|_| !self.is_abandoned)
     }
 
     /// Waits for the work to end, for at most `longest`.
     pub(super) fn wait(&mut self, longest: Duration) {
-        let Some(piece) = &mut self.newest else { return };
-        if piece.mailbox.wait_for_end(Some(longest))
-            && let Some(thread) = piece.thread.take()
+        if self
+            .newest
+            .as_ref()
+            .is_some_and(|mailbox| mailbox.wait_for_end(Some(longest)))
+            && let Some(thread) = self.thread.take()
         {
             // Panics in the work were caught.
             let _ = thread.join();
         }
-    }
-
-    fn mailbox(&self) -> Option<&Mailbox<E>> {
-        let piece = self.newest.as_ref().filter(|piece| !piece.is_abandoned)?;
-        Some(&piece.mailbox)
     }
 }
 
@@ -219,7 +214,7 @@ fn message(panic: &(dyn Any + Send)) -> String {
 pub(in crate::window) type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// Channel between a task and the window: events to the window, cancellation to the task.
-pub(super) struct Mailbox<E> {
+struct Mailbox<E> {
     is_cancelled: AtomicBool,
     inside: Mutex<Inside<E>>,
     ended: Condvar,
@@ -233,7 +228,7 @@ struct Inside<E> {
 }
 
 impl<E> Mailbox<E> {
-    pub(super) fn new() -> Self {
+    fn new() -> Self {
         Self {
             is_cancelled: AtomicBool::new(false),
             inside: Mutex::new(Inside {
@@ -250,34 +245,12 @@ impl<E> Mailbox<E> {
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn next_event(&self) -> Option<E> {
-        self.inside().events.pop_front()
-    }
-
-    pub(super) fn has_more(&self) -> bool {
-        let inside = self.inside();
-        !inside.has_ended || !inside.events.is_empty()
-    }
-
-    pub(super) fn cancel(&self) {
-        self.is_cancelled.store(true, Ordering::Relaxed);
-    }
-
     /// Waits for the work to end, for at most `longest`; returns true if it has ended.
-    pub(super) fn wait_for_end(&self, longest: Option<Duration>) -> bool {
-        let inside = self.inside();
+    fn wait_for_end(&self, longest: Option<Duration>) -> bool {
+        let longest = longest.unwrap_or(Duration::MAX);
         let runs = |inside: &mut Inside<E>| !inside.has_ended;
-        let inside = match longest {
-            None => self
-                .ended
-                .wait_while(inside, runs)
-                .unwrap_or_else(PoisonError::into_inner),
-            Some(longest) => {
-                let waited = self.ended.wait_timeout_while(inside, longest, runs);
-                waited.unwrap_or_else(PoisonError::into_inner).0
-            }
-        };
-        inside.has_ended
+        let waited = self.ended.wait_timeout_while(self.inside(), longest, runs);
+        waited.unwrap_or_else(PoisonError::into_inner).0.has_ended
     }
 }
 
@@ -288,10 +261,6 @@ pub(in crate::window) struct Report<E> {
 }
 
 impl<E> Report<E> {
-    pub(super) fn new(mailbox: Arc<Mailbox<E>>, wake: Wake) -> Self {
-        Self { mailbox, wake }
-    }
-
     /// Returns true if the work should end.
     pub(in crate::window) fn is_cancelled(&self) -> bool {
         self.mailbox.is_cancelled.load(Ordering::Relaxed)
@@ -312,9 +281,8 @@ impl<E> Report<E> {
 
     /// Sends a progress report. It replaces the previous one if the window has not received it and no other event was sent since,
     /// so that a hidden window receives only the latest. `keep` moves data that must not be lost from the older one.
-    pub(in crate::window) fn progress(&self, event: E, keep: impl FnOnce(E, &mut E)) {
+    pub(in crate::window) fn progress(&self, mut event: E, keep: impl FnOnce(E, &mut E)) {
         self.put(|inside| {
-            let mut event = event;
             if inside.has_progress
                 && let Some(older) = inside.events.pop_back()
             {
@@ -326,7 +294,7 @@ impl<E> Report<E> {
     }
 
     /// Sends the last event.
-    pub(super) fn end(&self, event: E) {
+    fn end(&self, event: E) {
         self.put(|inside| {
             inside.events.push_back(event);
             inside.has_ended = true;
@@ -341,6 +309,44 @@ impl<E> Report<E> {
 }
 
 #[cfg(test)]
-pub(in crate::window) mod planned_panic;
+pub(in crate::window) mod planned_panic {
+    //! Panics planned by tests in the work of a job.
+
+    use std::cell::Cell;
+
+    use crate::window::job::Report;
+
+    /// Message of the panics.
+    pub(in crate::window) const MESSAGE: &str = "a planned panic";
+
+    thread_local! {
+        static PLANNED: Cell<Option<&'static str>> = const { Cell::new(None) };
+    }
+
+    /// Makes the work panic that the job of this name starts next from this thread.
+    pub(in crate::window) fn plan(name: &'static str) {
+        PLANNED.set(Some(name));
+    }
+
+    /// Returns true until the planned panic has been started.
+    pub(in crate::window) fn is_pending() -> bool {
+        PLANNED.get().is_some()
+    }
+
+    /// Returns `work` of the job `name`, preceded by a panic if that is planned.
+    pub(super) fn before<E, T>(
+        name: &'static str,
+        work: impl FnOnce(&Report<E>) -> T + Send + 'static,
+    ) -> impl FnOnce(&Report<E>) -> T + Send + 'static {
+        let panics = PLANNED.get() == Some(name);
+        if panics {
+            PLANNED.set(None);
+        }
+        move |report| {
+            assert!(!panics, "{MESSAGE}");
+            work(report)
+        }
+    }
+}
 #[cfg(test)]
 mod tests;

@@ -7,7 +7,7 @@ use decoupler_files::{
 use eframe::egui::{Color32, CursorIcon, Rect, Response, Sense, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role};
 
 use super::paint::{bounds, measure, paint_over, rect, to_glam};
-use crate::window::{theme::Theme, widgets::value_under};
+use crate::window::theme::Theme;
 
 /// Click or hover on a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,24 +31,20 @@ fn map_ui(ui: &mut Ui, map: &HeatMap) -> HeatMapDrawing {
 pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Option<([usize; 2], CellPointed)> {
     let drawing = map_ui(ui, map);
     let mut pointed = None;
-    for ((row, column), &value) in map.values.indexed_iter() {
+    for ((row, column), note) in map.notes.indexed_iter() {
         let cell = rect(drawing.cells([row, 1], [column, 1]));
         let response = ui.interact(cell, ui.scope_id().with(("heat", row, column)), Sense::click());
         let is_marked = marked == Some([row, column]);
-        value_under(ui, cell, &format_number(value));
-        let tooltip = &map.notes[[row, column]];
         response.widget_info(|| {
-            let name = tooltip.lines().next().unwrap_or_default();
+            let name = note.lines().next().unwrap_or_default();
             WidgetInfo::selected(Role::Button, true, is_marked, name)
         });
-        let response = response
-            .on_hover_cursor(CursorIcon::PointingHand)
-            .on_hover_text(tooltip);
-        if response.double_clicked() {
-            pointed = Some(([row, column], CellPointed::Twice));
-        } else if response.clicked() {
-            pointed = Some(([row, column], CellPointed::Once));
-        }
+        let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(note);
+        pointed = match (response.double_clicked(), response.clicked()) {
+            (true, _) => Some(([row, column], CellPointed::Twice)),
+            (false, true) => Some(([row, column], CellPointed::Once)),
+            (false, false) => pointed,
+        };
         if is_marked {
             outline(ui, cell, Theme::of(ui).palette.text);
         }
@@ -87,7 +83,6 @@ pub fn cells_ui(
         outline(ui, rect(drawing.cells(rows, columns)), marked.2);
     }
     let cell = drawing.cell_at(to_glam(response.hover_pos()?))?;
-    value_under(ui, grid, &format_number(map.values[cell]));
     Some((cell, response))
 }
 

@@ -3,8 +3,8 @@
 
 use decoupler_files::figure::{Form, Ink, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Scale, Series};
 use eframe::egui::{
-    Color32, FontId, Id, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
-    accesskit::Role,
+    Color32, FontId, Id, Label, Popup, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2,
+    WidgetInfo, accesskit::Role,
 };
 use egui_plot::{
     AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
@@ -153,7 +153,7 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
                 palette,
                 &look.sample(to_glam(place.left_center()), place.width()),
             );
-            ui.label(RichText::new(name).size(type_size().note).color(palette.dim));
+            ui.add(Label::new(RichText::new(name).size(type_size().note).color(palette.dim)).extend());
             ui.add_space(space(2));
         }
     });
@@ -175,6 +175,8 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
             .tick_label_font(FontId::proportional(type_size().small))
     };
     let may_move = pointer == Pointer::Moves;
+    // A menu over the plot is not covered by tooltips.
+    let is_covered = Popup::is_any_open(ui.ctx());
     let mut shown = egui_plot::Plot::new(id)
         .id(id)
         .width(space.x)
@@ -192,7 +194,7 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
         .allow_zoom(may_move)
         .allow_boxed_zoom(may_move)
         .show_crosshair(false)
-        .label_formatter(|position| tooltip_at(plot, position).filter(|_| may_move))
+        .label_formatter(|position| tooltip_at(plot, position).filter(|_| may_move && !is_covered))
         .set_margin_fraction(Vec2::ZERO)
         .include_x(*x.start())
         .include_x(*x.end())

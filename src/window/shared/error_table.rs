@@ -1,40 +1,34 @@
-use eframe::egui::Ui;
+//! The one place that lays out error tables.
 
-use crate::window::{
-    glossary,
-    theme::{Theme, space},
-    widgets::{TableCell, TableColumn, TableRow, TableView},
-};
 use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{ErrorMeasure, ErrorRow, ErrorTable},
 };
 use decoupler_files::export::{format_number, format_r2};
+use eframe::egui::Ui;
+
+use crate::window::{
+    glossary::{self, Term},
+    theme::{Theme, space},
+    widgets::{TableCell, TableColumn, TableRow, TableView},
+};
 
 /// Measures of intervals, which have a table of their own.
 const OF_INTERVALS: [ErrorMeasure; 2] = [ErrorMeasure::HalfWidth, ErrorMeasure::CoveragePercent];
 
-/// Measures of error that the table shows: all but the worst node, which is shown below, and the intervals.
-fn is_in_table(measure: ErrorMeasure) -> bool {
-    measure != ErrorMeasure::WorstMm && !OF_INTERVALS.contains(&measure)
-}
+/// Meaning of the mark at a baseline.
+const BETTER: &str = "Better than what is used.";
 
 fn column(measure: ErrorMeasure) -> TableColumn<'static> {
-    let term = match measure {
-        ErrorMeasure::ZPercent => Some(glossary::Z_PERCENT),
-        ErrorMeasure::XPercent => Some(glossary::X_PERCENT),
-        ErrorMeasure::YPercent => Some(glossary::Y_PERCENT),
-        ErrorMeasure::ZMm => Some(glossary::Z_MM),
-        ErrorMeasure::ZStrokePercent => Some(glossary::STROKE_PERCENT),
-        _ => None,
-    };
-    let heading = match measure {
-        ErrorMeasure::RangePercent => "% of range",
-        measure => measure.heading().0,
-    };
-    match term {
-        Some(term) => TableColumn::figure(term.name).meaning(term.hint),
-        None => TableColumn::figure(heading).meaning(measure.definition()),
+    let of_term = |term: Term| TableColumn::figure(term.name).meaning(term.hint);
+    match measure {
+        ErrorMeasure::ZPercent => of_term(glossary::Z_PERCENT),
+        ErrorMeasure::XPercent => of_term(glossary::X_PERCENT),
+        ErrorMeasure::YPercent => of_term(glossary::Y_PERCENT),
+        ErrorMeasure::ZMm => of_term(glossary::Z_MM),
+        ErrorMeasure::ZStrokePercent => of_term(glossary::STROKE_PERCENT),
+        ErrorMeasure::RangePercent => TableColumn::figure("% of range").meaning(measure.definition()),
+        measure => TableColumn::figure(measure.heading().0).meaning(measure.definition()),
     }
 }
 
@@ -45,44 +39,43 @@ pub fn error_table_ui(ui: &mut Ui, tables: &[ErrorTable]) {
         return;
     };
     let palette = Theme::of(ui).palette;
-    let shown = Vec::from_iter((0..measures.len()).filter(|&place| is_in_table(measures[place])));
-    let columns = shown.iter().map(|&place| column(measures[place]));
-    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(columns));
+    // The worst node is shown below the table.
+    let is_shown = |measure: ErrorMeasure| measure != ErrorMeasure::WorstMm && !OF_INTERVALS.contains(&measure);
+    let shown = Vec::from_iter((0..measures.len()).filter(|&place| is_shown(measures[place])));
+    let mut columns = vec![TableColumn::text("")];
+    columns.extend(shown.iter().map(|&place| column(measures[place])));
     // The error that decides whether a baseline is better.
-    let judged = measures
-        .iter()
-        .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
+    let is_judged = |measure: &ErrorMeasure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse);
+    let judged = measures.iter().position(is_judged);
+    let judged = |row: &ErrorRow| row.errors.get(judged?).copied().flatten();
     let mut rows = Vec::new();
     for table in tables {
         let used = table.used();
-        let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
         let of_used = table.rows.iter().find(|row| row.name == used).and_then(judged);
-        let figure = |row: &ErrorRow, place: usize| match measures[place] {
-            ErrorMeasure::R2 => format_r2(row.errors[place]),
-            _ => format_number(row.errors[place]),
-        };
-        let row = |row: &ErrorRow| {
+        rows.extend(table.target.as_ref().map(|target| TableRow::section(target.title())));
+        for row in &table.rows {
             let name = match &table.target {
                 Some(target) => format!("{}, {}", target.title(), row.name),
                 None => row.name.to_owned(),
             };
-            TableRow::figures(row.name, shown.iter().map(|&place| figure(row, place)))
+            let figures = shown.iter().map(|&place| match measures[place] {
+                ErrorMeasure::R2 => format_r2(row.errors[place]),
+                _ => format_number(row.errors[place]),
+            });
+            let colour = match row.name {
+                name if name == used => palette.accent,
+                "published" | "model-based" => palette.dim,
+                _ => palette.text,
+            };
+            let is_baseline = ["training mean", "linear map", "ridge"].contains(&row.name);
+            let is_better = is_baseline && judged(row).zip(of_used).is_some_and(|(error, used)| error < used);
+            let row = TableRow::figures(row.name, figures)
                 .named(name)
                 .meaning(row_meaning(row.name))
-                .colour(match row.name {
-                    name if name == used => palette.accent,
-                    "published" | "model-based" => palette.dim,
-                    _ => palette.text,
-                })
-                .strong(row.name == used)
-                .mark(if beats(row.name, judged(row), of_used) {
-                    BETTER
-                } else {
-                    ""
-                })
-        };
-        rows.extend(table.target.as_ref().map(|target| TableRow::section(target.title())));
-        rows.extend(table.rows.iter().map(row));
+                .colour(colour)
+                .strong(row.name == used);
+            rows.push(row.mark(if is_better { BETTER } else { "" }));
+        }
     }
     TableView::new("errors", &columns).show_all(ui, rows);
     intervals_ui(ui, measures, tables);
@@ -130,16 +123,4 @@ fn row_meaning(name: &str) -> &'static str {
         "published" => glossary::PUBLISHED.hint,
         _ => "",
     }
-}
-
-/// Meaning of the mark at a baseline.
-const BETTER: &str = "Better than what is used.";
-
-/// Returns true for a baseline with a smaller error than the network.
-fn beats(name: &str, error: Option<f64>, of_network: Option<f64>) -> bool {
-    let is_baseline = ["training mean", "linear map", "ridge"].contains(&name);
-    is_baseline
-        && error
-            .zip(of_network)
-            .is_some_and(|(baseline, network)| baseline < network)
 }

@@ -1,9 +1,10 @@
 //! State shared by all views (the settings, the current training, the run list, the look of surfaces) and the effects
 //! that a view may ask for.
 
+mod command;
 mod error_table;
 mod export;
-mod network_exports;
+mod look;
 mod offers;
 mod run_list;
 mod run_view;
@@ -11,22 +12,17 @@ mod state;
 mod training_form;
 mod view;
 
-pub use super::training_worker::RunResult;
+pub use super::training_worker::{RunResult, RunView};
+pub use command::{About, Command, Offer, Offers};
 pub use error_table::error_table_ui;
 pub use export::{
-    Ask, Contents, Export, ExportGroup, FileTask, FileWords, Purpose, copy_exports, csv_export, error_table_export,
-    loss_export, picture_exports,
+    ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, ToCopy, file_stem,
+    saying_saved,
 };
-pub use network_exports::{
-    DecoderSource, NetworkSource, decoder_export_ui, decoder_forms_ui, file_stem, network_exports,
-};
-pub use offers::{Action, FileInUse, Offers, refuse_in_use};
-pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
-pub use run_view::{RunCommand, RunView, run_buttons_ui, sentence};
+pub use look::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
+pub use offers::{FileInUse, refuse_in_use};
+pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
+pub use run_view::{run_buttons_ui, sentence, training_status};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
-pub use training_form::{Effect, Matter, Notice, combination_name, method_choice_ui, method_settings_ui, stopping_ui};
-pub use view::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
-
-use run_view::training_status_ui;
-pub use state::Unfinished;
-pub use view::{Columns, View};
+pub use training_form::{Effect, Matter, Notice};
+pub use view::{Columns, Holdings, MIN_WIDTH_FOR_REPORT, Status, Tone, Unfinished, View, ViewKind};

@@ -3,10 +3,9 @@
 //! A separate thread keeps the runs in a folder. It answers each request with the updated list, which wakes the window.
 //! When the window closes, it waits for pending writes.
 //!
-//! The run list is changed only here: the displayed list at once, and the folder as soon as the thread gets to it.
+//! The run list is changed only there: the displayed list is what the thread answered last.
 
 use std::{
-    cell::Cell,
     fmt,
     path::PathBuf,
     sync::{
@@ -30,14 +29,15 @@ const LONGEST_WRITE: Duration = Duration::from_secs(5);
 const THREAD: &str = "run list";
 
 /// Requests to the thread.
-pub(super) enum RunsRequest {
+#[derive(Debug)]
+pub enum RunsRequest {
     /// Keep the runs in this folder.
     Open(PathBuf),
     /// Take over the changes of other windows.
     Look,
     /// Add a finished training.
-    Keep(Arc<NetworkFile>),
-    /// Give a run another name.
+    Keep(Box<NetworkFile>),
+    /// Give a run another name, unless that is empty.
     Rename(u64, String),
     /// Show this run in one of the two places, or nothing.
     Pin(usize, Option<u64>),
@@ -45,33 +45,15 @@ pub(super) enum RunsRequest {
     Remove(u64),
 }
 
-/// The run list after a request.
-pub(super) struct Listed {
-    pub(super) runs: KeptRuns,
-    /// Folder in which they are kept, if any.
-    pub(super) path: Option<PathBuf>,
-    /// Number of runs that could not be written.
-    pub(super) unwritten: usize,
-    /// Files that cannot be read or written.
-    pub(super) problems: Vec<String>,
-}
-
-/// Event from the thread.
-pub(super) enum RunsEvent {
-    /// The run list after a request.
-    Listed(Listed),
-    /// The thread has ended, with the reason if it was not supposed to.
-    Died(Option<JobError>),
-}
-
 /// The window's end of the thread.
 #[derive(Debug)]
 pub struct RunsWorker {
     requests: Option<Sender<RunsRequest>>,
-    job: Background<RunsEvent>,
-    /// Requests that were not answered yet.
-    unanswered: Cell<usize>,
+    job: Background<Listed>,
 }
+
+/// The run list after a request and the problems with files, or the reason why the thread has ended.
+type Listed = Result<(RunList, Vec<String>), Option<JobError>>;
 
 impl RunsWorker {
     /// Starts the thread. `wake` is called after each event.
@@ -82,54 +64,23 @@ impl RunsWorker {
             move |report| {
                 let mut folder = RunFolder::default();
                 for request in incoming {
-                    report.send(RunsEvent::Listed(answer(request, &mut folder)));
+                    report.send(Ok(answer(request, &mut folder)));
                 }
             },
-            |ended| RunsEvent::Died(ended.err()),
+            |ended| Err(ended.err()),
         );
         Self {
             requests: Some(requests),
             job,
-            unanswered: Cell::default(),
         }
     }
 
-    /// Shows the runs in the folder `path`, and keeps runs there from now on.
-    pub fn open(&self, path: PathBuf) {
-        self.ask(RunsRequest::Open(path));
-    }
-
-    /// Takes over the changes of other windows.
-    pub fn look(&self) {
-        self.ask(RunsRequest::Look);
-    }
-
-    /// Adds a finished training.
-    pub fn keep(&self, file: NetworkFile) {
-        self.ask(RunsRequest::Keep(Arc::new(file)));
-    }
-
-    pub(super) fn ask(&self, request: RunsRequest) {
+    /// Sends a request.
+    pub fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
             // The receiver is gone only if the thread died, which is reported as its last event.
-            if requests.send(request).is_ok() {
-                self.unanswered.set(self.unanswered.get() + 1);
-            }
+            let _ = requests.send(request);
         }
-    }
-
-    /// Returns the next event, if one has come.
-    pub(super) fn next_event(&self) -> Option<RunsEvent> {
-        let event = self.job.next_event()?;
-        if let RunsEvent::Listed(_) = event {
-            self.unanswered.set(self.unanswered.get().saturating_sub(1));
-        }
-        Some(event)
-    }
-
-    /// Returns true if the last list taken includes the effect of every request.
-    pub(super) fn is_up_to_date(&self) -> bool {
-        self.unanswered.get() == 0
     }
 }
 
@@ -141,49 +92,50 @@ impl Drop for RunsWorker {
     }
 }
 
-fn answer(request: RunsRequest, folder: &mut RunFolder) -> Listed {
+fn answer(request: RunsRequest, folder: &mut RunFolder) -> (RunList, Vec<String>) {
     // The thread keeps the runs that could not be written, so it must survive.
     let answered = caught(THREAD, || {
-        let mut problems = carry_out(request, folder);
+        // Changes apply to the current contents of the folder.
+        let mut problems = folder.look();
+        problems.extend(carry_out(request, folder).err());
         problems.extend(folder.load_used());
         problems
     });
     let problems = answered.unwrap_or_else(|error| vec![format!("{error}; the change is not kept")]);
-    Listed {
-        runs: folder.runs().clone(),
+    let list = RunList {
+        workspace: folder.runs().clone(),
         path: folder.path().map(PathBuf::from),
         unwritten: folder.unwritten(),
-        problems,
-    }
+    };
+    (list, problems)
 }
 
-/// Carries out a request; returns the problems.
-fn carry_out(request: RunsRequest, folder: &mut RunFolder) -> Vec<String> {
-    // Changes apply to the current contents of the folder.
-    let mut problems = folder.look();
+/// Carries out a request, or returns the problem.
+fn carry_out(request: RunsRequest, folder: &mut RunFolder) -> Result<(), String> {
+    let unkept = |error: &dyn fmt::Display| format!("{error}; the change is not kept");
     match request {
-        RunsRequest::Open(path) => match RunFolder::open(&path) {
-            Ok((opened, found)) => {
-                *folder = opened;
-                problems.extend(found);
+        RunsRequest::Open(path) => {
+            let opened = RunFolder::open(&path);
+            let (opened, found) = opened.map_err(|error| format!("{error}; runs of this session are not kept"))?;
+            *folder = opened;
+            if found.is_empty() {
+                Ok(())
+            } else {
+                Err(found.join(". "))
             }
-            Err(error) => problems.push(format!("{error}; runs of this session are not kept")),
-        },
-        RunsRequest::Look => {}
-        RunsRequest::Keep(file) => problems.extend(failure(folder.keep(file))),
-        RunsRequest::Rename(id, name) => problems.extend(failure(folder.rename(id, &name))),
+        }
+        RunsRequest::Keep(file) => folder.keep(Arc::from(file)).map_err(|error| unkept(&error)),
+        RunsRequest::Rename(id, name) if !name.trim().is_empty() => {
+            folder.rename(id, name.trim()).map_err(|error| unkept(&error))
+        }
+        RunsRequest::Look | RunsRequest::Rename(..) => Ok(()),
         RunsRequest::Pin(place, id) => {
             let mut pinned = folder.runs().pinned;
             pinned[place] = id;
-            problems.extend(failure(folder.pin(pinned)));
+            folder.pin(pinned).map_err(|error| unkept(&error))
         }
-        RunsRequest::Remove(id) => problems.extend(failure(folder.remove(id))),
+        RunsRequest::Remove(id) => folder.remove(id).map_err(|error| unkept(&error)),
     }
-    problems
-}
-
-fn failure<E: fmt::Display>(written: Result<(), E>) -> Option<String> {
-    written.err().map(|error| format!("{error}; the change is not kept"))
 }
 
 /// The names of the two places.
@@ -240,24 +192,15 @@ impl RunList {
     /// Takes the list from the thread; returns a notice for the user, if any.
     pub fn take_events(&mut self, worker: &RunsWorker) -> Option<Notice> {
         let mut notice = None;
-        while let Some(event) = worker.next_event() {
-            match event {
-                RunsEvent::Listed(Listed {
-                    runs,
-                    path,
-                    unwritten,
-                    problems,
-                }) => {
-                    (self.path, self.unwritten) = (path, unwritten);
-                    // A list from before the last change would undo it: a run removed meanwhile would be back.
-                    if worker.is_up_to_date() {
-                        self.workspace = runs;
-                    }
+        while let Some(listed) = worker.job.next_event() {
+            match listed {
+                Ok((list, problems)) => {
+                    *self = list;
                     if !problems.is_empty() {
                         notice = Some(Notice::Failed(problems.join(". ")));
                     }
                 }
-                RunsEvent::Died(reason) => {
+                Err(reason) => {
                     self.path = None;
                     let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
                     let text = format!("New runs are no longer kept{reason}. Restart the program.");
@@ -266,27 +209,6 @@ impl RunList {
             }
         }
         notice
-    }
-
-    /// Gives the run with this number another name, unless that is empty.
-    pub fn rename(&mut self, id: u64, name: &str, worker: &RunsWorker) {
-        let (name, run) = (name.trim(), self.workspace.runs.iter_mut().find(|run| run.id == id));
-        if let Some(run) = run.filter(|_| !name.is_empty()) {
-            name.clone_into(&mut run.name);
-            worker.ask(RunsRequest::Rename(id, name.to_owned()));
-        }
-    }
-
-    /// Shows a run in one of the two places, or nothing.
-    pub fn pin(&mut self, place: usize, id: Option<u64>, worker: &RunsWorker) {
-        self.workspace.pinned[place] = id;
-        worker.ask(RunsRequest::Pin(place, id));
-    }
-
-    /// Removes the run with this number for good.
-    pub fn remove(&mut self, id: u64, worker: &RunsWorker) {
-        self.workspace.runs.retain(|run| run.id != id);
-        worker.ask(RunsRequest::Remove(id));
     }
 }
 
@@ -330,7 +252,7 @@ mod tests {
         let (wake, woken) = channel();
         let worker = RunsWorker::start(Arc::new(move || wake.send(()).unwrap_or(())));
         let mut list = RunList::default();
-        worker.keep(small_run());
+        worker.ask(RunsRequest::Keep(Box::new(small_run())));
         // There is no third place.
         worker.ask(RunsRequest::Pin(PLACES.len(), None));
         (0..2).for_each(|_| wait(&woken));
@@ -342,36 +264,9 @@ mod tests {
             "{reason}"
         );
         assert_eq!(list.workspace.runs.len(), 1, "the run of this session is still there");
-        worker.keep(small_run());
+        worker.ask(RunsRequest::Keep(Box::new(small_run())));
         wait(&woken);
         assert_eq!(list.take_events(&worker), None);
         assert_eq!(list.workspace.runs.len(), 2);
-    }
-
-    #[test]
-    fn a_run_removed_or_renamed_is_not_brought_back_by_an_older_list() {
-        let folder = tempfile::tempdir().unwrap();
-        let (wake, woken) = channel();
-        let worker = RunsWorker::start(Arc::new(move || wake.send(()).unwrap_or(())));
-        let mut list = RunList::default();
-        worker.open(folder.path().to_owned());
-        for _ in 0..2 {
-            worker.keep(small_run());
-        }
-        (0..3).for_each(|_| wait(&woken));
-        assert!(list.take_events(&worker).is_none());
-        let [first, second] = [0, 1].map(|place: usize| list.workspace.runs[place].id);
-        // A list is on its way when the user removes one run and renames the other.
-        worker.look();
-        wait(&woken);
-        list.remove(first, &worker);
-        list.rename(second, "mine", &worker);
-        assert!(list.take_events(&worker).is_none());
-        let names = |list: &RunList| Vec::from_iter(list.workspace.runs.iter().map(|run| run.name.clone()));
-        assert_eq!(names(&list), ["mine"]);
-        (0..2).for_each(|_| wait(&woken));
-        assert!(list.take_events(&worker).is_none());
-        assert_eq!(names(&list), ["mine"]);
-        assert!(list.path.is_some());
     }
 }

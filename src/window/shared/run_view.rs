@@ -1,284 +1,126 @@
 use std::{sync::Arc, time::Duration};
 
-use decoupler_core::{
-    evaluation::{
-        Baselines, ErrorTable, PublishedErrors, RunSettings, Scores, StartRecord, TestErrors, auto::AutoRecord,
-    },
-    problem::Problem,
-    text::capitalised,
-    training::{EpochRecord, Stage, StopReason},
-};
+use decoupler_core::{evaluation::TestErrors, text::capitalised, training::StopReason};
 use decoupler_files::{
     export::{format_duration, format_number, format_percent},
-    figure::EpochOutline,
-    import::{Progress as Reading, Setup},
+    import::Progress as Reading,
 };
-use eframe::egui::{Color32, Key, Response, RichText, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Key, Ui, WidgetInfo, accesskit::Role};
 
-use super::{Phase, Shared, SourceKind};
+use super::{Effect, Phase, RecordingDraft, RunView, Shared, SourceKind, Status, Tone};
 use crate::window::{
-    test_view::TestSet,
-    theme::{Palette, Theme, space, type_size},
-    training_worker::{Began, PastNetworks, Progress, RunId, RunResult, append_epochs},
-    widgets::{Landmark, ghost_button, primary_button, state_ui, status_progress_ui, with_shortcut},
+    theme::space,
+    widgets::{ghost_button, primary_button, with_shortcut},
 };
-
-/// A training as known to the window.
-#[derive(Debug)]
-pub struct RunView {
-    /// Its identity.
-    pub id: RunId,
-    /// Setup it is trained with.
-    pub setup: Setup,
-    /// Setup on the left when it began or was continued: as [`Self::setup`], but with the number of epochs requested
-    /// from that point.
-    pub asked: Setup,
-    /// Description of the readings and targets.
-    pub problem: Arc<Problem>,
-    /// Weights and biases of the network.
-    pub weights: usize,
-    /// Its test set.
-    pub test: TestSet,
-    /// Errors of the baselines.
-    pub baselines: Baselines,
-    /// Errors that the paper reports for this configuration.
-    pub published: Option<PublishedErrors>,
-    /// Every epoch of the leader so far.
-    pub history: Vec<EpochRecord>,
-    /// The part of the history that the curves need.
-    pub outline: EpochOutline,
-    /// The methods that the leader went through.
-    pub stages: Vec<Stage>,
-    /// State of each start when last reported; empty if there is only one.
-    pub starts: Vec<StartRecord>,
-    /// Networks of the epochs so far.
-    pub past: PastNetworks,
-    /// Result of the best network on the test set.
-    pub result: Option<RunResult>,
-    /// Reason for which it ended, if it has.
-    pub stop_reason: Option<StopReason>,
-    /// What was tried to choose its settings, if they were chosen.
-    pub search: Option<AutoRecord>,
-    /// True while it is unchanged since it was opened from a checkpoint.
-    pub is_saved: bool,
-}
 
 impl RunView {
-    /// A training that has just begun.
-    pub fn new(began: Began) -> Self {
-        let Began {
-            id,
-            asked,
-            setup,
-            search,
-            problem,
-            weights,
-            test,
-            baselines,
-        } = began;
-        Self {
-            id,
-            published: setup.settings().published(),
-            asked,
-            setup,
-            search,
-            problem,
-            weights,
-            test,
-            baselines,
-            history: Vec::new(),
-            outline: EpochOutline::default(),
-            stages: Vec::new(),
-            starts: Vec::new(),
-            past: PastNetworks::default(),
-            result: None,
-            stop_reason: None,
-            is_saved: false,
+    /// Shares the plan of `draft`, if that is the same.
+    pub fn share_plan(&mut self, draft: &RecordingDraft) {
+        if let (Ok(plan), true) = (&draft.plan, draft.is_plan(self.plan.as_ref())) {
+            self.plan = Some(Arc::clone(plan));
         }
-    }
-
-    /// Settings it is trained with.
-    pub fn settings(&self) -> &RunSettings {
-        self.setup.settings()
-    }
-
-    /// Errors of this result and of the baselines.
-    pub fn scores(&self, result: &RunResult) -> Scores {
-        Scores {
-            network: result.errors.clone(),
-            network_alone: result.network_alone.clone(),
-            baselines: self.baselines.clone(),
-            coverage: result.coverage.clone(),
-        }
-    }
-
-    /// Error table of this result.
-    pub fn error_table(&self, result: &RunResult) -> Vec<ErrorTable> {
-        ErrorTable::of_scores(&self.problem, &self.scores(result), self.published.as_ref())
-    }
-
-    /// Takes the progress reported by the worker.
-    pub fn progress(&mut self, progress: Progress) {
-        let Progress {
-            epochs,
-            stages,
-            starts,
-            past,
-            result,
-            is_calibrating: _,
-            stop_reason,
-        } = progress;
-        self.stop_reason = stop_reason;
-        self.outline.extend(&epochs);
-        append_epochs(&mut self.history, epochs);
-        self.stages = stages;
-        self.past = past;
-        if let Some(starts) = starts {
-            self.starts = starts;
-        }
-        self.result = Some(result);
-    }
-
-    /// Returns the latest epoch.
-    pub fn latest(&self) -> Option<&EpochRecord> {
-        self.history.last()
     }
 }
 
-/// Command of the user for a training.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RunCommand {
-    /// Begin one.
-    Train,
-    /// Continue from the current weights with the current settings.
-    Continue,
-    /// Pause it.
-    Pause,
-    /// Resume it.
-    Resume,
-    /// Stop it.
-    Stop,
-}
-
-/// The buttons that run a training in this phase, from right to left. Train draws or reads the samples, as `hint` says.
-pub fn run_buttons_ui(
-    ui: &mut Ui,
-    phase: Phase,
-    (can_train, can_continue): (bool, bool),
-    hint: &str,
-) -> Option<RunCommand> {
-    let mut command = None;
-    let is_busy = phase.is_busy();
+/// The buttons that run a training, from right to left.
+pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    let phase = shared.phase;
     // In a narrow window the buttons show only their symbols.
     let is_short = ui.available_width() < space(120);
-    let stop = ui.add_enabled(is_busy, ghost_button(if is_short { "■" } else { "■ Stop" }));
-    name(&stop, "■ Stop");
-    if stop
-        .on_hover_text(with_shortcut(
-            ui,
-            "Ends the training; the best network so far is kept",
-            Key::Period,
-        ))
-        .clicked()
-    {
-        command = Some(RunCommand::Stop);
-    }
-    let (text, toggled) = if phase == Phase::Paused {
-        ("▶ Resume", RunCommand::Resume)
-    } else {
-        ("⏸ Pause", RunCommand::Pause)
+    let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, hint: String, effect: Effect| {
+        let shown = if is_short {
+            text.split(' ').next().unwrap_or(text)
+        } else {
+            text
+        };
+        let button = ui.add_enabled(is_possible, ghost_button(shown));
+        button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, text));
+        if button.on_hover_text(hint).clicked() {
+            effects.push(effect);
+        }
     };
+    let hint = with_shortcut(ui, "Ends the training; the best network so far is kept", Key::Period);
+    button_ui(ui, "■ Stop", phase.is_busy(), hint, Effect::Stop);
+    let (text, effect) = match phase {
+        Phase::Paused => ("▶ Resume", Effect::Resume),
+        _ => ("⏸ Pause", Effect::Pause),
+    };
+    let hint = with_shortcut(ui, "Pauses or resumes the training", Key::P);
     let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-    let sign = text.split(' ').next().unwrap_or(text);
-    let pause = ui.add_enabled(can_pause, ghost_button(if is_short { sign } else { text }));
-    name(&pause, text);
-    if pause
-        .on_hover_text(with_shortcut(ui, "Pauses or resumes the training", Key::P))
-        .clicked()
-    {
-        command = Some(toggled);
-    }
-    let train = ui.add_enabled(can_train && !is_busy, primary_button("▶ Train"));
-    Landmark::Train.stands_at(ui, train.rect);
-    let hint = if can_continue {
-        with_shortcut(ui, &format!("Starts again: {hint}"), Key::Enter)
-    } else {
-        with_shortcut(ui, &capitalised(hint), Key::Enter)
+    button_ui(ui, text, can_pause, hint, effect);
+    let can_train_longer = shared.can_continue();
+    let hint = match (can_train_longer, shared.source) {
+        (false, SourceKind::Array) => "Draws the sets and trains the network",
+        (true, SourceKind::Array) => "Starts again: draws the sets and trains the network",
+        (false, SourceKind::Recording) => "Reads the recording and trains the network",
+        (true, SourceKind::Recording) => "Starts again: reads the recording and trains the network",
     };
-    if train.on_hover_text(hint).clicked() {
-        command = Some(RunCommand::Train);
+    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
+    if train.on_hover_text(with_shortcut(ui, hint, Key::Enter)).clicked() {
+        effects.push(Effect::Train);
     }
-    if can_continue {
+    if can_train_longer {
         let hint = "Continues from the current weights with the method and the epochs on the left, counted from here. \
                     Train starts again from random weights.";
-        let button = ui.add(ghost_button("Continue"));
-        if button.on_hover_text(hint).clicked() {
-            command = Some(RunCommand::Continue);
+        if ui.add(ghost_button("Train longer")).on_hover_text(hint).clicked() {
+            effects.push(Effect::Continue);
         }
     }
-    command
 }
 
-/// Gives the button its full name for assistive technology.
-fn name(button: &Response, name: &str) {
-    let is_enabled = button.enabled();
-    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, name));
-}
-
-/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of
+/// Returns the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of
 /// reading a recording.
-pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
-    let palette = Theme::of(ui).palette;
-    ui.horizontal_centered(|ui| {
-        let (colour, text) = phase_in_words(shared, &palette);
-        state_ui(ui, colour, &text);
-        if let (Phase::Preparing, SourceKind::Recording) = (shared.phase, shared.source) {
-            if let Some(choosing) = &shared.choosing {
-                status_progress_ui(ui, "Choosing settings", choosing.share as f32);
-            } else if let Some(Reading { bytes, of: Some(of) }) = shared.reading {
-                status_progress_ui(ui, "Reading", bytes as f32 / of.max(1) as f32);
-            }
-            return;
+pub fn training_status(shared: &Shared) -> Status {
+    let mut status = phase_in_words(shared);
+    if let (Phase::Preparing, SourceKind::Recording) = (shared.phase, shared.source) {
+        if let Some(choosing) = &shared.choosing {
+            status.progress = Some(("Choosing settings", choosing.share as f32));
+        } else if let Some(Reading { bytes, of: Some(of) }) = shared.reading {
+            status.progress = Some(("Reading", bytes as f32 / of.max(1) as f32));
         }
-        let Some(run) = shared
-            .shown_run()
-            .or(shared.run.as_ref().filter(|_| shared.phase.is_busy()))
-        else {
-            return;
-        };
-        for part in progress_in_words(run, shared.phase) {
-            ui.label(RichText::new(part).size(type_size().note).color(palette.dim));
-        }
-        if shared.phase.is_busy() {
-            let epochs_run = run.result.as_ref().map_or(0, |result| result.epochs_run);
-            let epochs = run.settings().training.stopping.epochs.max(1);
-            status_progress_ui(ui, "Training", epochs_run as f32 / epochs as f32);
-        }
-    });
+        return status;
+    }
+    let running = shared.run.as_ref().filter(|_| shared.phase.is_busy());
+    let Some(run) = shared.shown_run().or(running) else {
+        return status;
+    };
+    status.notes = progress_in_words(run, shared.phase);
+    if shared.phase.is_busy() {
+        let epochs_run = run.result.as_ref().map_or(0, |result| result.epochs_run);
+        let epochs = run.settings().training.stopping.epochs.max(1);
+        status.progress = Some(("Training", epochs_run as f32 / epochs as f32));
+    }
+    status
 }
 
-/// Returns the colour and text of the phase.
-fn phase_in_words(shared: &Shared, palette: &Palette) -> (Color32, String) {
+/// Returns the phase as text.
+fn phase_in_words(shared: &Shared) -> Status {
     let is_recording = shared.source == SourceKind::Recording;
-    match shared.phase {
-        Phase::Idle if is_recording && shared.recording.plan.is_err() => {
-            (palette.dim, "Ready: open a recording".to_owned())
+    let (tone, text) = match shared.phase {
+        Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
+        Phase::Idle => (Tone::Calm, "Ready: press Train"),
+        Phase::Preparing if is_recording => {
+            let choosing = shared.choosing.as_ref().map(|choosing| choosing.text.as_str());
+            (Tone::Busy, choosing.unwrap_or("Reading the recording"))
         }
-        Phase::Idle => (palette.dim, "Ready: press Train".to_owned()),
-        Phase::Preparing if is_recording && shared.choosing.is_some() => {
-            let choosing = shared.choosing.as_ref().map(|choosing| choosing.text.clone());
-            (palette.accent, choosing.unwrap_or_default())
+        Phase::Preparing => (Tone::Busy, "Drawing samples"),
+        Phase::Training => (Tone::Busy, "Training"),
+        Phase::Paused => (Tone::Warning, "Paused"),
+        Phase::Calibrating => (Tone::Busy, "Calibrating the 90 % intervals"),
+        Phase::Ended(StopReason::Stopped) => {
+            let epoch = shared
+                .run
+                .as_ref()
+                .and_then(RunView::latest)
+                .map_or(0, |latest| latest.epoch);
+            return Status::new(Tone::Calm, format!("Stopped at epoch {epoch}"));
         }
-        Phase::Preparing if is_recording => (palette.accent, "Reading the recording".to_owned()),
-        Phase::Preparing => (palette.accent, "Drawing samples".to_owned()),
-        Phase::Training => (palette.accent, "Training".to_owned()),
-        Phase::Paused => (palette.warning, "Paused".to_owned()),
-        Phase::Calibrating => (palette.accent, "Calibrating the 90 % intervals".to_owned()),
-        Phase::Ended(StopReason::Stopped) => (palette.dim, format!("Ended: {}", StopReason::Stopped)),
-        Phase::Ended(reason) if reason.was_successful() => (palette.good, format!("Finished: {reason}")),
-        Phase::Ended(reason) => (palette.bad, format!("Ended: {reason}")),
-        Phase::Died => (palette.bad, "The training thread ended unexpectedly".to_owned()),
-    }
+        Phase::Ended(reason) if reason.was_successful() => {
+            return Status::new(Tone::Good, format!("Finished: {reason}"));
+        }
+        Phase::Ended(reason) => return Status::new(Tone::Bad, format!("Ended: {reason}")),
+    };
+    Status::new(tone, text)
 }
 
 fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
@@ -301,7 +143,7 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
     ];
     if run.settings().starts > 1 && phase.is_busy() {
         parts.push(format!(
-            "{} of {} starts ended",
+            "{} of {} restarts ended",
             result.starts_ended,
             run.settings().starts
         ));

@@ -15,7 +15,7 @@ use decoupler_files::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::{FileTask, Look, RunList, RunResult, RunView};
+use super::{Look, RunList, RunResult, RunView, ViewKind};
 use crate::window::test_view::{HeightScale, RecordedTest, TestView};
 
 /// State that all views read.
@@ -41,8 +41,10 @@ pub struct Shared {
     pub runs: RunList,
     /// Camera and mode of surfaces.
     pub look: Look,
-    /// The names of the views whose threads compute.
-    pub working: Vec<&'static str>,
+    /// The displayed view.
+    pub shown: ViewKind,
+    /// The views whose threads compute.
+    pub working: Vec<ViewKind>,
 }
 
 /// Kinds of source.
@@ -57,7 +59,7 @@ pub enum SourceKind {
 }
 
 /// Settings of a training on a recording, and the plan that reads it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct RecordingDraft {
     /// Settings; their source is measured.
     pub settings: RunSettings,
@@ -76,10 +78,20 @@ impl RecordingDraft {
         self.is_auto && self.settings.source.row_model() == RowModel::Shared
     }
 
-    /// Returns true if `setup` is that of these settings and files.
-    fn is_setup(&self, setup: &Setup) -> bool {
-        let plan = self.plan.as_ref().ok().map(|plan| &**plan);
-        plan.is_some() && (setup.plan(), setup.settings()) == (plan, &self.settings)
+    /// Returns true if this is its plan. A plan that was not changed is not compared.
+    pub fn is_plan(&self, other: Option<&Arc<Plan>>) -> bool {
+        match (self.plan.as_ref().ok(), other) {
+            (Some(plan), Some(other)) => Arc::ptr_eq(plan, other) || plan == other,
+            (plan, other) => plan.is_none() && other.is_none(),
+        }
+    }
+}
+
+impl PartialEq for RecordingDraft {
+    fn eq(&self, other: &Self) -> bool {
+        (self.settings, self.is_auto, self.plan.as_ref().err())
+            == (other.settings, other.is_auto, other.plan.as_ref().err())
+            && self.is_plan(other.plan.as_ref().ok())
     }
 }
 
@@ -108,8 +120,6 @@ pub enum Phase {
     Calibrating,
     /// Ended, and why.
     Ended(StopReason),
-    /// The worker is gone.
-    Died,
 }
 
 impl Phase {
@@ -154,6 +164,7 @@ impl Shared {
                 heights: HeightScale::default(),
                 error_limit_mm: None,
             },
+            shown: ViewKind::default(),
             working: Vec::new(),
         }
     }
@@ -172,7 +183,8 @@ impl Shared {
     /// Returns the current training if its settings were chosen automatically for what the next one would be chosen for.
     pub fn chosen_run(&self) -> Option<&RunView> {
         let run = self.shown_run().filter(|run| run.search.is_some())?;
-        (self.recording.is_automatic() && self.recording.is_setup(&run.asked)).then_some(run)
+        let is_setup = self.recording.settings == *run.asked.settings() && self.recording.is_plan(run.plan.as_ref());
+        (self.recording.is_automatic() && is_setup).then_some(run)
     }
 
     /// Sets the training settings of the next training.
@@ -231,17 +243,20 @@ impl Shared {
     /// must be the same. A paused training is resumed instead, unless the method or the stopping rules change.
     pub fn can_continue(&self) -> bool {
         let Some(run) = self.shown_run() else { return false };
+        let asked = run.asked.settings();
         let may_continue = match self.phase {
-            Phase::Paused => self.chosen_run().is_none() && self.settings().training != run.asked.settings().training,
+            Phase::Paused => self.chosen_run().is_none() && self.settings().training != asked.training,
             Phase::Ended(reason) => reason != StopReason::Diverged,
             _ => false,
         };
-        let Ok(setup) = self.setup() else { return false };
-        let fixed = setup.with_settings(RunSettings {
-            training: run.asked.settings().training,
-            ..*setup.settings()
-        });
-        may_continue && fixed == run.asked
+        let settings = match self.source {
+            SourceKind::Array => self.draft,
+            SourceKind::Recording => self.recording.settings,
+        };
+        let training = asked.training;
+        may_continue
+            && RunSettings { training, ..settings } == *asked
+            && (self.source == SourceKind::Array || self.recording.is_plan(run.plan.as_ref()))
     }
 
     /// The current result.
@@ -264,30 +279,5 @@ pub fn opening_scene() -> Scene {
     Scene {
         loading: Loading::Indenter(Indenter::default()),
         ..Scene::default()
-    }
-}
-
-/// Work that closing the window would cut short, or whose result it would discard.
-#[derive(Debug)]
-pub struct Unfinished {
-    /// Name that distinguishes the work from other work of the same view: "Training".
-    pub work: &'static str,
-    /// Its progress: "epoch 12 of 1000".
-    pub progress: String,
-    /// Saves what has been done so far, if that is possible.
-    pub saving: Option<FileTask>,
-    /// True if the result is kept after the window closes once the work has ended.
-    pub is_kept: bool,
-}
-
-impl Unfinished {
-    /// Work that can only be discarded, and whose result is lost when the window closes.
-    pub fn discarded(work: &'static str, progress: String) -> Self {
-        Self {
-            work,
-            progress,
-            saving: None,
-            is_kept: false,
-        }
     }
 }

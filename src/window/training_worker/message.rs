@@ -1,23 +1,18 @@
 use std::{
     cell::Cell,
-    fmt,
     path::PathBuf,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
+        atomic::{AtomicU64, Ordering},
         mpsc::{Sender, channel},
     },
     time::Duration,
 };
 
 use decoupler_core::{
-    evaluation::{
-        Baselines, Coverage, Run, RunError, RunSettings, StartRecord, TestErrors,
-        auto::{AutoProgress, AutoRecord},
-    },
+    evaluation::{Coverage, Run, RunError, RunSettings, StartRecord, TestErrors, auto::AutoProgress},
     live::{DriftReference, LiveError},
     network::Networks,
-    problem::Problem,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
 use decoupler_files::{
@@ -26,23 +21,19 @@ use decoupler_files::{
 };
 use ndarray::Array2;
 
-use super::{calibration::Calibration, keeping::Kept, past_networks::PastNetworks, training_loop::TrainingLoop};
+use super::{
+    calibration::Calibration, keeping::Keeping, past_networks::PastNetworks, run_view::RunView,
+    training_loop::TrainingLoop,
+};
 use crate::window::{
     job::{Background, JobError, Wake},
-    test_view::{Frame, TargetCharts, TestSet, TestViewError},
+    test_view::TargetCharts,
 };
 
 /// Request from the window to the worker.
-#[derive(Debug)]
 pub enum Request {
-    /// Start a training; one in progress is discarded.
-    Train(Box<Setup>),
-    /// Choose the settings for this recording, and start a training with them; one in progress is discarded.
-    Choose(Box<Setup>),
-    /// Load the training saved in this file and pause it; one in progress is discarded.
-    Open(PathBuf),
-    /// Restore the training with these states of its starts and pause it; one in progress is discarded.
-    TakeUp(Box<Setup>, Vec<TrainerState>),
+    /// Begin a training; one in progress is discarded.
+    Begin(RunId, Origin),
     /// Continue from the current weights with this method and this many additional epochs.
     Continue(TrainingSettings),
     /// Pause.
@@ -55,29 +46,47 @@ pub enum Request {
     Inspect(RunId, Inspection),
     /// Keep checkpoints of running trainings in this folder from now on, saved at this interval.
     Keep(PathBuf, Duration),
-    /// Resume the training that was offered.
-    ResumeLeft,
     /// Remove the checkpoint that was offered.
     DiscardLeft,
     /// Save the checkpoint of the running training now, and answer.
     Save(Sender<()>),
 }
 
+/// What a training begins with.
+#[derive(Debug)]
+pub enum Origin {
+    /// New networks with these settings.
+    New(Box<Setup>),
+    /// New networks with settings that are chosen for this recording.
+    Chosen(Box<Setup>),
+    /// These states of its starts; it is paused.
+    States(Box<Setup>, Vec<TrainerState>),
+    /// A checkpoint; it is paused.
+    File(PathBuf),
+    /// The training that was cut short and is offered.
+    Left,
+}
+
+/// How a training begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// With new networks.
+    New,
+    /// From a checkpoint or states, paused.
+    Paused,
+    /// From the checkpoint of a training that was cut short.
+    Resumed,
+}
+
 /// Message from the worker to the window.
 #[derive(Debug)]
 pub enum Event {
     /// A training has begun, or an error.
-    Began(Result<Box<Began>, TestViewError>),
-    /// A saved training has been restored, or an error.
-    Opened(Result<Box<Began>, String>),
-    /// A training that was cut short continues, or an error.
-    Resumed(Result<Box<Began>, String>),
+    Began(RunId, Start, Result<Box<RunView>, String>),
     /// Question about a training that was cut short, if there is one.
     Left(Option<String>),
     /// The running training cannot be kept, with the reason.
     Unkept(String),
-    /// A training was cancelled during its preparation.
-    Abandoned,
     /// The training continues with these settings, or an error.
     Continued(Result<Box<RunSettings>, String>),
     /// Progress of reading a recording before a training.
@@ -92,10 +101,8 @@ pub enum Event {
     Died(Option<JobError>),
 }
 
-/// Function called with a training, or with the reason why it is not available.
-pub struct Inspection(Box<Inspect>);
-
-type Inspect = dyn FnOnce(Result<&TrainedRun, &str>) + Send;
+/// Function called on the thread of the worker with a training, or with the reason why it is not available.
+pub type Inspection = Box<dyn FnOnce(Result<&TrainedRun, &str>) + Send>;
 
 /// Run of the worker, with the origin of recorded samples.
 pub struct TrainedRun {
@@ -111,55 +118,16 @@ pub struct TrainedRun {
     pub calibration: Option<Calibration>,
 }
 
-impl Inspection {
-    /// Wraps `inspect`, which is called on the thread of the worker.
-    pub fn new(inspect: impl FnOnce(Result<&TrainedRun, &str>) + Send + 'static) -> Self {
-        Self(Box::new(inspect))
-    }
-
-    /// Calls the function with `run`.
-    pub(super) fn inspect(self, run: Result<&TrainedRun, &str>) {
-        (self.0)(run);
-    }
-}
-
-impl fmt::Debug for Inspection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Inspection")
-    }
-}
-
 /// Identity of a training, unique also across workers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RunId(u64);
+pub struct RunId(pub(super) u64);
 
 impl RunId {
     /// Returns a new, unique identity.
     pub fn new() -> Self {
-        static BEGUN: AtomicU64 = AtomicU64::new(0);
+        static BEGUN: AtomicU64 = AtomicU64::new(1);
         Self(BEGUN.fetch_add(1, Ordering::Relaxed))
     }
-}
-
-/// Data known when a training begins.
-#[derive(Debug)]
-pub struct Began {
-    /// Its identity.
-    pub id: RunId,
-    /// Requested setup.
-    pub asked: Setup,
-    /// Setup of the training: as requested, or with the settings that were chosen.
-    pub setup: Setup,
-    /// What was tried to choose the settings, if they were chosen.
-    pub search: Option<AutoRecord>,
-    /// Description of the readings and targets.
-    pub problem: Arc<Problem>,
-    /// Number of weights and biases of the network.
-    pub weights: usize,
-    /// The test set.
-    pub test: TestSet,
-    /// Errors of the baselines.
-    pub baselines: Baselines,
 }
 
 /// State of a training.
@@ -169,8 +137,8 @@ pub struct Progress {
     pub epochs: Vec<EpochRecord>,
     /// Methods of the leading start so far.
     pub stages: Vec<Stage>,
-    /// State of each start, if there are several; sent only occasionally.
-    pub starts: Option<Vec<StartRecord>>,
+    /// State of each start, if there are several.
+    pub starts: Vec<StartRecord>,
     /// Networks of the epochs so far.
     pub past: PastNetworks,
     /// Result so far.
@@ -182,11 +150,10 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Merges in an older report that was not received, so that its epochs and the states of its starts are not lost.
+    /// Merges in an older report that was not received, so that its epochs are not lost.
     pub fn replace(&mut self, older: Self) {
         let newer = std::mem::replace(&mut self.epochs, older.epochs);
         append_epochs(&mut self.epochs, newer);
-        self.starts = self.starts.take().or(older.starts);
     }
 }
 
@@ -207,8 +174,6 @@ pub struct RunResult {
     pub charts: Option<Arc<TargetCharts>>,
     /// Remarks on the errors of a recording, when the training is paused or has ended.
     pub remarks: Vec<String>,
-    /// Displayed snapshot and its surface, which is interpolated here to spare the window.
-    pub frame: Option<(usize, Frame)>,
     /// Errors of the decoded values.
     pub errors: TestErrors,
     /// Errors of the network alone, if a combination is used.
@@ -269,47 +234,42 @@ pub struct Worker {
     job: Background<Event>,
     /// Shared with the thread that waits for signals.
     requests: Arc<Mutex<Sender<Request>>>,
-    kept: Kept,
-    /// Numbers of requested and finished preparations of trainings.
-    requested: Cell<u64>,
-    finished: Cell<u64>,
-    /// Number of the last cancelled preparation; all earlier ones are cancelled, too.
-    cancelled: Arc<AtomicU64>,
-    /// Displayed snapshot.
-    snapshot: Arc<AtomicUsize>,
+    keeping: Keeping,
+    /// The training that is being prepared.
+    awaited: Cell<Option<RunId>>,
+    watched: Arc<Watched>,
+}
+
+/// What the window tells the worker in the middle of its work.
+#[derive(Debug, Default)]
+pub(super) struct Watched {
+    /// Number of the training last asked for: the preparations of others are cancelled.
+    pub(super) newest: AtomicU64,
 }
 
 impl Worker {
     /// Starts the thread; `wake` is called after each event.
     pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
-        let cancelled = Arc::<AtomicU64>::default();
         let mut job = Background::new("training", wake);
-        let snapshot = Arc::<AtomicUsize>::default();
-        let kept = Kept::default();
-        let (in_thread, shown, keeps) = (Arc::clone(&cancelled), Arc::clone(&snapshot), kept.clone());
+        let (watched, keeping) = (Arc::<Watched>::default(), Keeping::default());
+        let (in_thread, keeps) = (Arc::clone(&watched), keeping.clone());
         job.start(
-            move |report| TrainingLoop::new(report, &in_thread, &shown, keeps).run(&incoming),
+            move |report| TrainingLoop::new(report, &in_thread, keeps).run(&incoming),
             |ended| Event::Died(ended.err()),
         );
         Self {
             requests: Arc::new(Mutex::new(requests)),
             job,
-            kept,
-            requested: Cell::default(),
-            finished: Cell::default(),
-            cancelled,
-            snapshot,
+            keeping,
+            awaited: Cell::default(),
+            watched,
         }
     }
 
-    /// Returns a worker whose thread panics; `wake` is called afterwards.
-    #[cfg(test)]
-    pub fn dying(wake: Wake) -> Self {
-        let mut dead = Self::start(wake);
-        *dead.requests() = channel().0;
-        dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
-        dead
+    /// Returns true if the thread has ended.
+    pub fn has_died(&self) -> bool {
+        !self.job.is_under_way()
     }
 
     /// Starts another thread after this one has died.
@@ -326,7 +286,7 @@ impl Worker {
 
     /// Removes the checkpoint of the running training, which the user leaves unfinished, and keeps none from now on.
     pub fn forget(&self) {
-        self.kept.forget();
+        self.keeping.forget();
     }
 
     /// Returns a function that saves the running training and waits until it is saved.
@@ -336,52 +296,49 @@ impl Worker {
         let requests = Arc::clone(&self.requests);
         move || {
             let (done, saved) = channel();
+            let requests = requests.lock().unwrap_or_else(PoisonError::into_inner);
             // If the thread has died, there is nothing to save.
-            let _ = requests
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .send(Request::Save(done));
+            let _ = requests.send(Request::Save(done));
+            drop(requests);
             let _ = saved.recv_timeout(LONGEST_SAVE);
         }
+    }
+
+    /// Begins a training. Others that are being prepared are cancelled.
+    pub fn begin(&self, origin: Origin) {
+        let id = RunId::new();
+        self.awaited.set(Some(id));
+        self.watched.newest.store(id.0, Ordering::Relaxed);
+        self.ask(Request::Begin(id, origin));
     }
 
     /// Sends a request. Stopping also cancels a training that is being prepared. If the worker has died,
     /// [`Self::next_event`] reports it.
     pub fn ask(&self, request: Request) {
-        match request {
-            Request::Train(_) | Request::Choose(_) | Request::Open(_) | Request::TakeUp(..) | Request::ResumeLeft => {
-                self.requested.set(self.requested.get() + 1);
-            }
-            Request::Stop => self.cancelled.store(self.requested.get(), Ordering::Relaxed),
-            _ => {}
+        if matches!(request, Request::Stop) && self.awaited.take().is_some() {
+            self.watched.newest.store(RunId::new().0, Ordering::Relaxed);
         }
         // The receiver is dropped only if the worker died.
         let _ = self.requests().send(request);
     }
 
-    /// Selects the snapshot whose surface is part of later results.
-    pub fn watch(&self, snapshot: usize) {
-        self.snapshot.store(snapshot, Ordering::Relaxed);
-    }
-
     /// Returns true while a training is being prepared and not cancelled.
     pub fn is_preparing(&self) -> bool {
-        self.requested.get() > self.finished.get().max(self.cancelled.load(Ordering::Relaxed))
+        self.awaited.get().is_some()
     }
 
     /// Returns the next event, if one has arrived.
     pub fn next_event(&self) -> Option<Event> {
         loop {
-            let event = self.job.next_event()?;
-            if let Event::Began(_) | Event::Opened(_) | Event::Resumed(_) | Event::Abandoned = event {
-                self.finished.set(self.finished.get() + 1);
-            }
-            let is_cancelled = self.finished.get() <= self.cancelled.load(Ordering::Relaxed);
-            match event {
-                Event::Abandoned => {}
+            match self.job.next_event()? {
                 // Errors of a cancelled preparation are ignored.
-                Event::Began(Err(_)) | Event::Opened(Err(_)) | Event::Resumed(Err(_)) if is_cancelled => {}
-                event => return Some(event),
+                Event::Began(id, _, Err(_)) if self.awaited.get() != Some(id) => {}
+                event => {
+                    if matches!(event, Event::Began(id, ..) if self.awaited.get() == Some(id)) {
+                        self.awaited.set(None);
+                    }
+                    return Some(event);
+                }
             }
         }
     }
@@ -390,6 +347,16 @@ impl Worker {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl Worker {
+        /// Returns a worker whose thread panics; `wake` is called afterwards.
+        pub fn dying(wake: Wake) -> Self {
+            let mut dead = Self::start(wake);
+            *dead.requests() = channel().0;
+            dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
+            dead
+        }
+    }
 
     /// Returns epochs of a start with this error.
     fn epochs(start: f64, numbers: std::ops::Range<usize>) -> Vec<EpochRecord> {

@@ -5,8 +5,10 @@ mod calibration;
 mod keeping;
 mod message;
 mod past_networks;
+mod run_view;
 mod training_loop;
 
-pub use message::{Began, Event, Inspection, Progress, Request, RunId, RunResult, TrainedRun, Worker, append_epochs};
+pub use message::{Event, Origin, Progress, Request, RunId, RunResult, Start, TrainedRun, Worker};
 pub use past_networks::PastNetworks;
+pub use run_view::RunView;
 pub use training_loop::LOST;

@@ -3,439 +3,392 @@ use std::{
     path::Path,
     sync::{
         Arc,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
-        mpsc::{Receiver, Sender, TryRecvError},
+        atomic::Ordering,
+        mpsc::{Receiver, TryRecvError},
     },
     time::{Duration, Instant},
 };
 
-use ndarray::Array2;
-
-use super::{
-    Began, Event, Inspection, Progress as Advance, Request, RunId, RunResult, TrainedRun,
-    calibration::Calibration,
-    keeping::{Keeping, Kept},
-    message::{continue_run, furthest_epoch},
-    past_networks::PastNetworks,
-};
-use crate::window::{
-    job::Report,
-    test_view::{TestSet, TestViewError},
-};
 use decoupler_core::{
-    dataset::SplitBy,
     evaluation::{
-        Run, Scores, TestErrors,
+        Intervals, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
         frame_us,
         recorded::Determination,
     },
     job::Job,
-    training::{TrainerState, TrainingSettings},
+    training::TrainingSettings,
 };
 use decoupler_files::{
     export::{
         CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
         describe_worse_than_ridge,
     },
-    import::{ChoosingProgress, Plan, Progress, Setup, SetupError, SetupSets},
+    import::{ChoosingProgress, Progress as Reading, Setup, SetupSets},
     machine::system_cause,
+};
+use ndarray::Array2;
+
+use super::{
+    Event, Origin, Progress, Request, RunId, RunResult, RunView, Start, TrainedRun,
+    calibration::Calibration,
+    keeping::{Keeping, question},
+    message::{Watched, continue_run, furthest_epoch},
+    past_networks::PastNetworks,
+};
+use crate::window::{
+    job::Report,
+    test_view::{TestSet, TestViewError},
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
 /// responsive, even if frames are drawn without a graphics card.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Minimum time between two evaluations of all starts, each of which decodes the test set.
-const STARTS_INTERVAL: Duration = Duration::from_millis(500);
-
 /// State of the thread.
 pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
-    /// Number of the last cancelled preparation.
-    cancelled: &'a AtomicU64,
-    /// Displayed snapshot.
-    snapshot: &'a AtomicUsize,
-    /// Number of preparations so far.
-    preparations: u64,
-    run: Option<TrainedRun>,
+    watched: &'a Watched,
+    keeping: Keeping,
+    /// Checkpoints of trainings that were cut short; the last is offered first.
+    left: Vec<CheckpointPlace>,
+    current: Option<Training>,
+}
+
+/// The current training.
+struct Training {
+    id: RunId,
+    trained: TrainedRun,
     /// Its test set, ready to be drawn.
-    test: Option<TestSet>,
-    /// Networks of its past epochs.
+    test: TestSet,
     past: PastNetworks,
-    /// Identity of the training `run`.
-    id: Option<RunId>,
-    is_paused: bool,
-    is_calibrating: bool,
+    stage: Stage,
     /// Reason why the training that has ended has no intervals.
     no_intervals: Option<String>,
-    /// True if the result of a finished run has been sent to the window.
-    is_kept: bool,
-    keeping: Keeping,
     /// Start of the last report, and its number of reported epochs.
     reported: (usize, usize),
     next_report: Instant,
-    next_starts: Instant,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Training,
+    Paused,
+    /// Its epochs have been run.
+    Calibrating,
+    /// Its result has been sent to the window.
+    Done,
 }
 
 impl<'a> TrainingLoop<'a> {
-    pub(super) fn new(
-        report: &'a Report<Event>,
-        cancelled: &'a AtomicU64,
-        snapshot: &'a AtomicUsize,
-        kept: Kept,
-    ) -> Self {
+    pub(super) fn new(report: &'a Report<Event>, watched: &'a Watched, keeping: Keeping) -> Self {
         Self {
             report,
-            cancelled,
-            snapshot,
-            preparations: 0,
-            run: None,
-            test: None,
-            past: PastNetworks::default(),
-            id: None,
-            is_paused: false,
-            is_calibrating: false,
-            no_intervals: None,
-            is_kept: false,
-            keeping: Keeping::new(kept),
-            reported: (0, 0),
-            next_report: Instant::now(),
-            next_starts: Instant::now(),
+            watched,
+            keeping,
+            left: Vec::new(),
+            current: None,
         }
     }
 
     /// Handles requests and trains until the window is closed.
     pub(super) fn run(&mut self, requests: &Receiver<Request>) {
         while !self.report.is_cancelled() {
-            let request = if self.is_training() {
-                requests.try_recv()
-            } else {
-                requests.recv().map_err(TryRecvError::from)
+            let stage = self.current.as_ref().map(|current| current.stage);
+            let request = match stage {
+                Some(Stage::Training | Stage::Calibrating) => requests.try_recv(),
+                _ => requests.recv().map_err(TryRecvError::from),
             };
             match request {
                 Ok(request) => self.answer(request),
-                Err(TryRecvError::Empty) => self.train_one_epoch(requests),
+                Err(TryRecvError::Empty) if stage == Some(Stage::Calibrating) => self.calibrate(requests),
+                Err(TryRecvError::Empty) => self.step(),
                 Err(TryRecvError::Disconnected) => return,
             }
         }
     }
 
-    fn is_training(&self) -> bool {
-        self.unfinished().is_some() && !self.is_paused
-    }
-
-    /// The training that has not ended, or whose result has not been sent to the window.
-    fn unfinished(&self) -> Option<&TrainedRun> {
-        let unfinished = self.run.as_ref();
-        unfinished.filter(|trained| trained.run.stop_reason().is_none() || !self.is_kept)
-    }
-
     fn answer(&mut self, request: Request) {
-        match request {
-            Request::Train(setup) => {
-                let prepared = self.prepare_setup(&setup, None);
-                self.begin(prepared, None, Event::Began);
+        match (request, &mut self.current) {
+            (Request::Begin(id, origin), _) => self.begin(id, origin),
+            (Request::Continue(training), _) => self.continue_training(training),
+            (Request::Pause, Some(current)) if current.stage == Stage::Training => {
+                current.stage = Stage::Paused;
+                self.publish();
             }
-            Request::Choose(setup) => {
-                let prepared = self.choose(&setup).map(|(trained, began)| {
-                    let asked = Setup::clone(&setup);
-                    (trained, Box::new(Began { asked, ..*began }))
-                });
-                self.begin(prepared, None, Event::Began);
+            (Request::Resume, Some(current)) if current.stage == Stage::Paused => current.stage = Stage::Training,
+            (Request::Stop, Some(current)) if matches!(current.stage, Stage::Training | Stage::Paused) => {
+                current.trained.run.stop();
+                // Nothing is calibrated for it.
+                let calibrated = current.calibrated(&|| true);
+                self.end(calibrated);
             }
-            Request::Open(path) => {
-                let prepared = self.open(&path);
-                self.begin(prepared, None, Event::Opened);
+            (Request::Pause | Request::Resume | Request::Stop, _) => {}
+            (Request::Inspect(id, inspection), Some(current)) if current.id == id => {
+                inspection(Ok(&current.trained));
             }
-            Request::TakeUp(setup, states) => {
-                let prepared = self.prepare_setup(&setup, Some(states));
-                self.begin(prepared.map_err(|error| error.to_string()), None, Event::Opened);
-            }
-            Request::Continue(training) => self.continue_training(training),
-            Request::Pause => {
-                self.is_paused = true;
-                self.report_progress();
-            }
-            Request::Resume => self.is_paused = false,
-            Request::Stop => {
-                if let Some(trained) = self.run.as_mut().filter(|trained| trained.run.stop_reason().is_none()) {
-                    trained.run.stop();
-                    // Nothing is calibrated for it.
-                    self.end(&|_| true);
+            (Request::Inspect(_, inspection), Some(_)) => inspection(Err(REPLACED)),
+            // The window offers no export before the first training, so a training was lost.
+            (Request::Inspect(_, inspection), None) => inspection(Err(LOST)),
+            (Request::Keep(folder, interval), _) => match self.keeping.open(&folder, interval) {
+                Ok(left) => {
+                    self.left = left;
+                    self.offer_left();
                 }
-            }
-            Request::Inspect(id, inspection) => self.inspect(id, inspection),
-            Request::Keep(folder, interval) => match self.keeping.open(&folder, interval) {
-                Ok(()) => self.offer_left(),
-                Err(error) => self.unkept(format!("'{}': {}", folder.display(), system_cause(&error))),
+                Err(error) => {
+                    let reason = format!("'{}': {}", folder.display(), system_cause(&error));
+                    self.report.send(Event::Unkept(reason));
+                }
             },
-            Request::ResumeLeft => {
-                match self.keeping.take_left() {
-                    Some(left) => {
-                        let prepared = self.open(left.path());
-                        self.begin(prepared, Some(left), Event::Resumed);
-                    }
-                    None => {
-                        self.preparations += 1;
-                        self.report.send(Event::Abandoned);
-                    }
-                }
-                self.offer_left();
-            }
-            Request::DiscardLeft => {
-                if let Some(left) = self.keeping.take_left() {
+            (Request::DiscardLeft, _) => {
+                if let Some(left) = self.left.pop() {
                     left.clear();
                 }
                 self.offer_left();
             }
-            Request::Save(done) => self.save(&done),
+            (Request::Save(done), current) => {
+                if let Some(current) = current.as_ref().filter(|current| current.stage != Stage::Done) {
+                    self.keeping.save(&current.trained.run);
+                }
+                // The program ends meanwhile.
+                let _ = done.send(());
+            }
         }
-    }
-
-    /// Saves the running training and answers.
-    fn save(&self, done: &Sender<()>) {
-        if let Some(trained) = self.unfinished() {
-            self.keeping.save(&trained.run);
-        }
-        // The program ends meanwhile.
-        let _ = done.send(());
     }
 
     fn offer_left(&self) {
-        self.report.send(Event::Left(self.keeping.offer()));
+        self.report.send(Event::Left(self.left.last().map(question)));
     }
 
-    fn unkept(&self, reason: String) {
-        self.report.send(Event::Unkept(reason));
+    /// Replaces the current training by a new one; the current one and its files stay if the new one is invalid.
+    fn begin(&mut self, id: RunId, origin: Origin) {
+        let start = match origin {
+            Origin::New(_) | Origin::Chosen(_) => Start::New,
+            Origin::States(..) | Origin::File(_) => Start::Paused,
+            Origin::Left => Start::Resumed,
+        };
+        match self.prepare(id, origin) {
+            Err(reason) => self.report.send(Event::Began(id, start, Err(reason))),
+            Ok((trained, began)) => {
+                let left = self.left.pop_if(|_| start == Start::Resumed);
+                let has_ended = trained.run.stop_reason().is_some();
+                let stage = match start {
+                    // Its intervals were being calibrated.
+                    Start::Resumed if has_ended => Stage::Calibrating,
+                    // It was kept when it ended.
+                    _ if has_ended => Stage::Done,
+                    Start::Paused => Stage::Paused,
+                    Start::New | Start::Resumed => Stage::Training,
+                };
+                self.keeping.begin(left, trained.recorded.as_ref());
+                let mut past = PastNetworks::default();
+                past.record(&trained.run);
+                self.current = Some(Training {
+                    id,
+                    trained,
+                    test: began.test.clone(),
+                    past,
+                    stage,
+                    no_intervals: None,
+                    reported: (0, 0),
+                    next_report: Instant::now(),
+                });
+                self.report.send(Event::Began(id, start, Ok(Box::new(began))));
+                self.publish();
+            }
+        }
+        if start == Start::Resumed {
+            self.offer_left();
+        }
     }
 
-    /// Restores the training saved in the checkpoint at `path`.
-    fn open(&self, path: &Path) -> Result<(TrainedRun, Box<Began>), String> {
-        let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
-        let prepared = self.prepare(|job, on_progress| {
-            let (run, sets) = file.resume(job, on_progress)?;
-            Ok(TrainedRun::new(run, &sets))
-        });
-        prepared.map_err(|error| format!("'{}': {error}", path.display()))
-    }
-
-    fn inspect(&self, id: RunId, inspection: Inspection) {
-        inspection.inspect(match &self.run {
-            Some(run) if self.id == Some(id) => Ok(run),
-            Some(_) => Err(REPLACED),
-            // The window offers no export before the first training, so a training was lost.
-            None => Err(LOST),
-        });
-    }
-
-    /// Draws or reads the samples of `setup` and begins its trainings.
-    fn prepare_setup(
-        &self,
-        setup: &Setup,
-        states: Option<Vec<TrainerState>>,
-    ) -> Result<(TrainedRun, Box<Began>), TestViewError> {
-        self.prepare(|job, on_progress| {
-            let sets = setup.sets(Path::new(""), job, on_progress)?;
-            let run = sets.run(setup, states, job)?;
-            Ok(TrainedRun::new(run, &sets))
-        })
-    }
-
-    /// Reads the recording of `setup`, chooses its settings and initialises the networks.
-    fn choose(&self, setup: &Setup) -> Result<(TrainedRun, Box<Began>), TestViewError> {
+    /// Draws or reads the samples of a training, chooses its settings if they are to be chosen, and initialises or restores
+    /// its networks.
+    fn prepare(&self, id: RunId, origin: Origin) -> Result<(TrainedRun, RunView), String> {
         let report = self.report;
-        self.prepare(|job, on_progress| {
-            let mut on_choosing = |progress| match progress {
-                ChoosingProgress::Reading(progress) => on_progress(progress),
-                ChoosingProgress::Trying(progress) => {
-                    report.progress(Event::Choosing(Box::new(progress)), |_, _| ());
-                }
-            };
-            let (fixed, folder) = (AutoFixed::default(), Path::new(""));
-            let (setup, sets) = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, job, &mut on_choosing)?;
-            let run = sets.run(&setup, None, job)?;
-            Ok(TrainedRun::new(run, &sets))
-        })
-    }
-
-    /// Prepares a run with `get`, which can be cancelled and reports the progress of reading a recording.
-    fn prepare(
-        &self,
-        get: impl FnOnce(&Job<'_>, &mut dyn FnMut(Progress)) -> Result<TrainedRun, TestViewError>,
-    ) -> Result<(TrainedRun, Box<Began>), TestViewError> {
-        let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
-        let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
+        let is_cancelled = || self.watched.newest.load(Ordering::Relaxed) != id.0 || report.is_cancelled();
         let job = Job::new(&is_cancelled);
-        let trained = get(&job, &mut |progress| {
-            report.progress(Event::Reading(progress), |_, _| ());
-        })?;
-        let begun = begun(trained)?;
-        job.check().map_err(SetupError::from)?;
-        Ok(begun)
-    }
-
-    /// Replaces the current run by a new one; the current run and its files stay if the new one is invalid. A run resumed from
-    /// the checkpoint `left` is kept there.
-    fn begin<X>(
-        &mut self,
-        prepared: Result<(TrainedRun, Box<Began>), X>,
-        left: Option<CheckpointPlace>,
-        event: fn(Result<Box<Began>, X>) -> Event,
-    ) {
-        self.preparations += 1;
-        let (trained, began) = match prepared {
-            Ok(prepared) => prepared,
-            Err(error) => {
-                if let Some(left) = left {
-                    self.keeping.put_back(left);
-                }
-                return self.report.send(event(Err(error)));
+        let mut on_reading = |progress: Reading| report.progress(Event::Reading(progress), |_, _| ());
+        let here = Path::new("");
+        let mut asked = None;
+        let mut draw = |setup: &Setup, states| -> Result<TrainedRun, TestViewError> {
+            let sets = setup.sets(here, &job, &mut on_reading)?;
+            Ok(TrainedRun::new(sets.run(setup, states, &job)?, &sets))
+        };
+        let trained = match origin {
+            Origin::New(setup) => draw(&setup, None).map_err(|error| error.to_string())?,
+            Origin::States(setup, states) => draw(&setup, Some(states)).map_err(|error| error.to_string())?,
+            Origin::Chosen(setup) => {
+                let mut on_choosing = |progress| match progress {
+                    ChoosingProgress::Reading(progress) => on_reading(progress),
+                    ChoosingProgress::Trying(progress) => {
+                        report.progress(Event::Choosing(Box::new(progress)), |_, _| ());
+                    }
+                };
+                let fixed = AutoFixed::default();
+                let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, here, &job, &mut on_choosing);
+                let (chosen, sets) = chosen.map_err(|error| error.to_string())?;
+                let run = sets.run(&chosen, None, &job).map_err(|error| error.to_string())?;
+                asked = Some(*setup);
+                TrainedRun::new(run, &sets)
+            }
+            Origin::File(path) => restored(&path, &job, &mut on_reading)?,
+            Origin::Left => {
+                let left = self.left.last().ok_or("There is no training to resume")?;
+                restored(left.path(), &job, &mut on_reading)?
             }
         };
-        let has_ended = trained.run.stop_reason().is_some();
-        // A run that had ended before it was saved was kept when it ended, unless its intervals were being calibrated.
-        self.is_kept = has_ended && left.is_none();
-        self.is_calibrating = has_ended && left.is_some();
-        self.keeping.begin(left, trained.recorded.as_ref());
-        self.past = PastNetworks::default();
-        self.past.record(&trained.run);
-        (self.run, self.id, self.test) = (Some(trained), Some(began.id), Some(began.test.clone()));
-        self.no_intervals = None;
-        self.reported = (0, 0);
-        self.next_starts = Instant::now();
-        let event = event(Ok(began));
-        self.is_paused = matches!(event, Event::Opened(_));
-        self.report.send(event);
-        self.report_progress();
+        let began =
+            RunView::begun(id, &trained.run, trained.recorded.as_ref(), asked).map_err(|error| error.to_string())?;
+        job.check().map_err(|error| error.to_string())?;
+        Ok((trained, began))
     }
 
     fn continue_training(&mut self, training: TrainingSettings) {
-        let continued = match &mut self.run {
-            Some(TrainedRun {
-                run,
-                recorded,
-                calibration,
-                ..
-            }) => continue_run(run, training)
-                .map(|()| {
-                    if let (Some(recorded), Some(calibration)) = (recorded, calibration) {
-                        recorded.forget_choice();
-                        run.set_combined(None);
-                        calibration.forget_choice();
-                    }
-                    *run.settings()
-                })
-                .map_err(|error| error.to_string()),
+        let continued = match &mut self.current {
             None => Err(LOST.to_owned()),
+            Some(current) => {
+                let TrainedRun {
+                    run,
+                    recorded,
+                    calibration,
+                    ..
+                } = &mut current.trained;
+                continue_run(run, training)
+                    .map(|()| {
+                        if let (Some(recorded), Some(calibration)) = (recorded, calibration) {
+                            recorded.forget_choice();
+                            run.set_combined(None);
+                            calibration.forget_choice();
+                        }
+                        (current.stage, current.no_intervals) = (Stage::Training, None);
+                        Box::new(*run.settings())
+                    })
+                    .map_err(|error| error.to_string())
+            }
         };
         let has_failed = continued.is_err();
-        self.report.send(Event::Continued(continued.map(Box::new)));
+        self.report.send(Event::Continued(continued));
         if !has_failed {
-            (self.is_paused, self.is_kept, self.no_intervals) = (false, false, None);
-            self.report_progress();
+            self.publish();
         }
     }
 
-    fn train_one_epoch(&mut self, requests: &Receiver<Request>) {
-        let Some(TrainedRun { run, .. }) = &mut self.run else {
-            return;
-        };
-        let ended = run.step().is_some();
-        self.past.record(run);
+    /// Trains one epoch.
+    fn step(&mut self) {
+        let Some(current) = &mut self.current else { return };
+        let run = &mut current.trained.run;
+        let has_ended = run.step().is_some();
+        current.past.record(run);
         let unkept = self.keeping.save_if_due(run);
-        if ended {
-            self.calibrate(requests);
-        } else if Instant::now() >= self.next_report {
-            self.report_progress();
+        if has_ended && current.trained.calibration.is_some() {
+            current.stage = Stage::Calibrating;
+            self.keeping.save(run);
+            self.publish();
+        } else if has_ended {
+            self.end(None);
+        } else if Instant::now() >= current.next_report {
+            self.publish();
         }
         if let Some(reason) = unkept {
-            self.unkept(reason);
+            self.report.send(Event::Unkept(reason));
         }
     }
 
-    /// Calibrates the intervals of the training that has ended, and reports its end. A request for something else ends the
-    /// calibration and is answered.
+    /// Calibrates the intervals of the training that has ended. A request for something else ends the calibration and is
+    /// answered.
     fn calibrate(&mut self, requests: &Receiver<Request>) {
-        let calibrated = self.run.as_ref().filter(|trained| trained.calibration.is_some());
-        self.is_calibrating = calibrated.is_some();
-        if let Some(trained) = calibrated {
-            self.keeping.save(&trained.run);
-            self.report_progress();
-        }
+        let Some(current) = &self.current else { return };
         let pending = RefCell::new(None);
-        let is_cancelled = |worker: &Self| {
+        let is_cancelled = || {
             while pending.borrow().is_none() {
                 match requests.try_recv() {
-                    Ok(Request::Inspect(id, inspection)) => worker.inspect(id, inspection),
-                    Ok(Request::Save(done)) => worker.save(&done),
+                    Ok(Request::Inspect(id, inspection)) if current.id == id => inspection(Ok(&current.trained)),
+                    Ok(Request::Save(done)) => {
+                        self.keeping.save(&current.trained.run);
+                        let _ = done.send(());
+                    }
                     // Sent before the window knew that no epoch is left.
                     Ok(Request::Pause | Request::Resume) => {}
                     Ok(request) => *pending.borrow_mut() = Some(request),
-                    Err(TryRecvError::Empty) => return worker.report.is_cancelled(),
+                    Err(TryRecvError::Empty) => return self.report.is_cancelled(),
                     Err(TryRecvError::Disconnected) => return true,
                 }
             }
             true
         };
-        self.end(&is_cancelled);
+        let calibrated = current.calibrated(&is_cancelled);
+        self.end(calibrated);
         if let Some(request) = pending.into_inner() {
             self.answer(request);
         }
     }
 
-    /// Reports the end of the training, with intervals unless `is_cancelled`.
-    fn end(&mut self, is_cancelled: &dyn Fn(&Self) -> bool) {
-        let calibrated = self.run.as_ref().and_then(|TrainedRun { run, calibration, .. }| {
-            let calibration = calibration.as_ref()?;
-            let calibrated = calibration.calibrate(run, &Job::new(&|| is_cancelled(self)));
-            Some(calibrated)
-        });
-        self.no_intervals = None;
-        if let (Some(trained), Some(calibrated)) = (&mut self.run, calibrated) {
-            match calibrated {
-                Ok(intervals) => trained.run.set_intervals(intervals),
-                Err(reason) => self.no_intervals = Some(reason),
-            }
+    /// Ends the training that has run its epochs or was stopped: reports it, and sends its network.
+    fn end(&mut self, calibrated: Option<Result<Intervals, String>>) {
+        let Some(current) = &mut self.current else { return };
+        match calibrated {
+            Some(Ok(intervals)) => current.trained.run.set_intervals(intervals),
+            Some(Err(reason)) => current.no_intervals = Some(reason),
+            None => {}
         }
-        self.is_calibrating = false;
-        self.report_progress();
+        current.stage = Stage::Done;
+        self.publish();
+        // The end of the program is not that of the training, whose intervals are then missing.
+        if !self.report.is_cancelled() {
+            self.keeping.clear();
+        }
+        let file = self.current.as_ref().map(|current| current.trained.network_file());
+        let checked = file.map(|file| file.and_then(|file| file.check().map(|()| Box::new(file))));
+        if let Some(finished) = checked {
+            let finished = finished.map_err(|defect| format!("This training was not added to the run list: {defect}"));
+            self.report.send(Event::Finished(finished));
+        }
     }
 
-    fn report_progress(&mut self) {
-        let Some(TrainedRun { run, .. }) = &self.run else {
-            return;
-        };
+    /// Reports the progress of the training.
+    fn publish(&mut self) {
+        let Some(current) = &mut self.current else { return };
+        let progress = current.progress();
+        self.report
+            .progress(Event::Progressed(Box::new(progress)), |older, newer| {
+                if let (Event::Progressed(older), Event::Progressed(newer)) = (older, newer) {
+                    newer.replace(*older);
+                }
+            });
+    }
+}
+
+impl Training {
+    /// Returns the intervals of a recording, or the reason why there are none; nothing for a simulated array.
+    fn calibrated(&self, is_cancelled: &dyn Fn() -> bool) -> Option<Result<Intervals, String>> {
+        let calibration = self.trained.calibration.as_ref()?;
+        Some(calibration.calibrate(&self.trained.run, &Job::new(is_cancelled)))
+    }
+
+    /// Returns its state, with the epochs since the last report.
+    fn progress(&mut self) -> Progress {
         let begun = Instant::now();
-        let number = run.leader_number();
-        let trainer = &run.trainers()[number];
+        let run = &self.trained.run;
+        let leader = run.leader_number();
+        let trainer = &run.trainers()[leader];
         let networks = run.network();
-        let scores = run.scores();
         let answers = run.decouple_test();
         let errors = run.errors_of(&answers);
-        let network_alone = scores.and_then(|scores| scores.network_alone);
-        let test = self.test.as_ref();
-        let frame = test.and_then(TestSet::array).map(|test| {
-            let snapshot = test.nearest_snapshot(self.snapshot.load(Ordering::Relaxed));
-            (snapshot, test.frame(answers.view(), snapshot))
-        });
-        let charts = test
-            .and_then(TestSet::recording)
-            .map(|test| Arc::new(test.charts(&answers)));
-        let cost = begun.elapsed();
+        let network_alone = run.scores().and_then(|scores| scores.network_alone);
+        let charts = self.test.recording().map(|test| Arc::new(test.charts(&answers)));
         let has_several = run.trainers().len() > 1;
-        let stop_reason = run.stop_reason().filter(|_| !self.is_calibrating);
-        let is_idle = self.is_paused || stop_reason.is_some();
-        let starts = (has_several && (is_idle || begun >= self.next_starts)).then(|| run.starts());
-        if starts.is_some() {
-            // Uses at most a tenth of the time.
-            self.next_starts = Instant::now() + STARTS_INTERVAL.max(9 * (begun.elapsed() - cost));
-        }
-        let reported = match self.reported {
-            (leader, epochs) if leader == number => epochs,
-            _ => 0,
-        };
-        let progress = Box::new(Advance {
+        let starts = if has_several { run.starts() } else { Vec::new() };
+        let cost = begun.elapsed();
+        let is_calibrating = self.stage == Stage::Calibrating;
+        let stop_reason = run.stop_reason().filter(|_| !is_calibrating);
+        let is_idle = self.stage == Stage::Paused || stop_reason.is_some();
+        let reported = if self.reported.0 == leader { self.reported.1 } else { 0 };
+        let frame_time = is_idle
+            .then(|| frame_us(&mut networks.decoder(), run.test()).ok())
+            .flatten();
+        let ended = run.trainers().iter().filter(|start| start.stop_reason().is_some());
+        let progress = Progress {
             epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
             stages: trainer.stages().to_vec(),
             starts,
@@ -448,89 +401,49 @@ impl<'a> TrainingLoop<'a> {
                 },
                 answers: Arc::new(answers),
                 charts,
-                frame,
                 errors,
                 network_alone,
                 coverage: run.coverage().to_vec(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),
-                starts_ended: run
-                    .trainers()
-                    .iter()
-                    .filter(|start| start.stop_reason().is_some())
-                    .count(),
+                starts_ended: ended.count(),
                 wall_time: run.wall_time(),
-                frame_time: Some(run.test())
-                    .filter(|_| is_idle)
-                    .and_then(|test| frame_us(&mut networks.decoder(), test).ok())
-                    .map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
+                frame_time: frame_time.map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
                 is_idle,
                 networks: Arc::new(networks),
             },
-            is_calibrating: self.is_calibrating,
+            is_calibrating,
             stop_reason,
-        });
-        self.report.progress(Event::Progressed(progress), |older, newer| {
-            if let (Event::Progressed(older), Event::Progressed(newer)) = (older, newer) {
-                newer.replace(*older);
-            }
-        });
-        self.reported = (number, trainer.history().len());
+        };
+        self.reported = (leader, trainer.history().len());
         // Decoding a large test set takes long; it may use at most a fifth of the time.
         self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
-        if !self.is_calibrating {
-            self.report_finished();
-        }
+        progress
     }
 
     /// Returns the remarks on the decoded test samples of a recording.
     fn remarks(&self, answers: &Array2<f64>, errors: &TestErrors) -> Vec<String> {
-        let recorded = self
-            .run
-            .as_ref()
-            .and_then(|trained| Some((trained, trained.recorded.as_ref()?)));
-        let Some((trained, recorded)) = recorded else {
+        let run = &self.trained.run;
+        let Some(recorded) = &self.trained.recorded else {
             return Vec::new();
         };
-        let run = &trained.run;
+        let (targets, has_combined) = (&run.problem().targets, run.combined().is_some());
         let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
-        let mut remarks = trained.of_samples.clone();
-        remarks.extend(describe_determinacy(
-            &run.problem().targets,
-            &determined,
-            run.combined().is_some(),
-        ));
+        let mut remarks = self.trained.of_samples.clone();
+        remarks.extend(describe_determinacy(targets, &determined, has_combined));
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),
-                network_alone: run.combined().is_some().then(|| errors.clone()),
+                network_alone: has_combined.then(|| errors.clone()),
                 baselines: baselines.clone(),
                 coverage: Vec::new(),
             };
             remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
         }
-        remarks.extend(describe_coverage(&run.problem().targets, run.coverage()));
+        remarks.extend(describe_coverage(targets, run.coverage()));
         remarks.extend(self.no_intervals.clone());
         remarks
-    }
-
-    /// Sends the result of a finished run, once.
-    fn report_finished(&mut self) {
-        let Some(trained) = self.run.as_ref().filter(|trained| trained.run.stop_reason().is_some()) else {
-            return;
-        };
-        if std::mem::replace(&mut self.is_kept, true) {
-            return;
-        }
-        // The end of the program is not that of the training, whose intervals are then missing.
-        if !self.report.is_cancelled() {
-            self.keeping.clear();
-        }
-        let file = trained.network_file();
-        let checked = file.and_then(|file| file.check().map(|()| Box::new(file)));
-        let finished = checked.map_err(|defect| format!("This training was not added to the run list: {defect}"));
-        self.report.send(Event::Finished(finished));
     }
 }
 
@@ -541,26 +454,12 @@ pub const LOST: &str = "the network was lost when the training thread ended; tra
 const REPLACED: &str = "the file was not written, because another training has replaced the one to be saved; finished \
                         trainings are in the run list of the Compare view";
 
-/// Returns a run with the data that the window needs.
-fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError> {
-    let run = &trained.run;
-    let plan = trained.recorded.as_ref().map(|recorded| recorded.plan.clone());
-    let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
-    let setup = Setup::of(*run.settings(), plan).expect("a recorded run has its plan");
-    let began = Began {
-        id: RunId::new(),
-        asked: setup.clone(),
-        setup,
-        search: trained.recorded.as_ref().and_then(|recorded| recorded.search.clone()),
-        problem: Arc::clone(run.problem()),
-        weights: run.leader().weights(),
-        test: TestSet::of(run, order)?,
-        baselines: run
-            .baselines()
-            .cloned()
-            .expect("the baselines of a whole run are measured"),
-    };
-    Ok((trained, Box::new(began)))
+/// Restores the training saved in the checkpoint at `path`.
+fn restored(path: &Path, job: &Job<'_>, on_reading: &mut dyn FnMut(Reading)) -> Result<TrainedRun, String> {
+    let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
+    let resumed = file.resume(job, on_reading);
+    let (run, sets) = resumed.map_err(|error| format!("'{}': {error}", path.display()))?;
+    Ok(TrainedRun::new(run, &sets))
 }
 
 impl TrainedRun {

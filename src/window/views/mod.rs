@@ -1,44 +1,38 @@
 //! The views, one module each; they do not depend on each other.
 //!
-//! A new view is a module whose main type implements [`View`], with a field and a line in [`Views`] below. It requests
-//! changes to the window as an [`Effect`](crate::window::shared::Effect); a new kind of request needs a variant in
-//! `shared/effect.rs` and its implementation in `window/applying.rs`.
+//! A new view is a module whose main type implements [`View`], with a [`ViewKind`] and a field and a line in [`Views`]
+//! below. It requests changes to the window as an [`Effect`](crate::window::shared::Effect), which the frame applies.
 
 mod compare;
-mod experiments;
-mod identifiability;
 mod live;
-mod trade_off;
+mod sensor;
+mod study;
 mod train;
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{job::Wake, shared::View};
+use super::{
+    job::Wake,
+    shared::{View, ViewKind},
+};
 use decoupler_files::import::Plan;
 
-pub use identifiability::{Analysis, Question};
-pub use trade_off::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffPlan};
 pub(super) use train::CHECKPOINT;
-pub use train::{BottomTab, DecoderResult, Touch};
+pub use train::DecoderResult;
 
-use self::{
-    compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,
-    trade_off::TradeOffView, train::TrainView,
-};
+use self::{compare::CompareView, live::LiveView, sensor::SensorView, study::StudyView, train::TrainView};
 
 /// All views.
 #[derive(Debug)]
 pub struct Views {
     /// One training and the sensor that it decodes.
     pub train: TrainView,
-    /// The paper's tables and sweeps.
-    pub experiments: ExperimentsView,
+    /// Many trainings or measurements at once.
+    pub study: StudyView,
     /// Two finished trainings side by side.
     pub compare: CompareView,
     /// What the readings determine.
-    pub identifiability: IdentifiabilityView,
-    /// Speed and accuracy of each decoder.
-    pub trade_off: TradeOffView,
+    pub sensor: SensorView,
     /// Frames decoded as they arrive.
     pub live: LiveView,
 }
@@ -48,10 +42,9 @@ impl Views {
     pub fn new(wake: &Wake) -> Self {
         Self {
             train: TrainView::new(Arc::clone(wake)),
-            experiments: ExperimentsView::new(Arc::clone(wake)),
+            study: StudyView::new(Arc::clone(wake)),
             compare: CompareView::new(Arc::clone(wake)),
-            identifiability: IdentifiabilityView::new(Arc::clone(wake)),
-            trade_off: TradeOffView::new(Arc::clone(wake)),
+            sensor: SensorView::new(Arc::clone(wake)),
             live: LiveView::new(Arc::clone(wake)),
         }
     }
@@ -71,15 +64,19 @@ impl Views {
         !self.train.recording.is_empty()
     }
 
-    /// Returns the views in the order of the top bar; the first is the Train view.
-    pub fn all(&mut self) -> [&mut dyn View; 6] {
-        [
-            &mut self.train,
-            &mut self.experiments,
-            &mut self.compare,
-            &mut self.identifiability,
-            &mut self.trade_off,
-            &mut self.live,
-        ]
+    /// Opens dropped files in the Train view.
+    pub fn open_files(&mut self, paths: Vec<PathBuf>) {
+        self.train.recording.open(paths);
+    }
+
+    /// Returns a view.
+    pub fn get(&mut self, view: ViewKind) -> &mut dyn View {
+        match view {
+            ViewKind::Train => &mut self.train,
+            ViewKind::Study => &mut self.study,
+            ViewKind::Compare => &mut self.compare,
+            ViewKind::Sensor => &mut self.sensor,
+            ViewKind::Live => &mut self.live,
+        }
     }
 }

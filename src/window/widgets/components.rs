@@ -1,16 +1,13 @@
-//! Components that egui lacks, each accessible by its label.
-//!
-//! Parts shared by all fields: the reason why typed text was refused, and the menu of a value.
+//! Components that egui lacks, each accessible by its label, and the reason why text typed into a field was refused.
 
 use eframe::egui::{
-    self, Align, Button, CollapsingHeader, Color32, Context, DragValue, FontId, Frame, Id, Key, KeyboardShortcut,
-    Label, Layout, Margin, Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui,
-    UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
+    Align, Button, CollapsingHeader, Color32, DragValue, FontId, Frame, Id, Key, KeyboardShortcut, Label, Layout,
+    Margin, Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, UiBuilder,
+    Vec2, Widget, WidgetInfo, WidgetText,
     accesskit::{Invalid, Role},
     vec2,
 };
 
-use super::fields::value_under;
 use crate::window::theme::{Theme, radius, semibold, space, type_size};
 
 /// Returns the tooltip of an action with its shortcut: "Pauses the training (Ctrl+P).", with the Command key on macOS.
@@ -72,23 +69,10 @@ pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
     });
 }
 
-/// Primary button.
-#[must_use = "a button shows only where it is added"]
-pub struct PrimaryButton {
-    text: String,
-    min_size: Vec2,
-}
-
-impl PrimaryButton {
-    /// Sets the minimum size.
-    pub fn min_size(mut self, min_size: Vec2) -> Self {
-        self.min_size = min_size;
-        self
-    }
-}
-
-impl Widget for PrimaryButton {
-    fn ui(self, ui: &mut Ui) -> Response {
+/// Primary button, at least as large as `min_size`.
+pub fn primary_button_of(text: impl Into<String>, min_size: Vec2) -> impl Widget {
+    let text = RichText::new(text).font(semibold(type_size().body));
+    move |ui: &mut Ui| {
         let palette = Theme::of(ui).palette;
         let coloured = |ui: &mut Ui| {
             let widgets = &mut ui.visuals_mut().widgets;
@@ -97,21 +81,15 @@ impl Widget for PrimaryButton {
             widgets.active.weak_bg_fill = palette.accent_hovered;
             // On the accent colour, a ring of the same colour would be invisible.
             widgets.active.bg_stroke.color = palette.text;
-            let text = RichText::new(self.text)
-                .font(semibold(type_size().body))
-                .color(palette.on_accent);
-            ui.add(Button::new(text).min_size(self.min_size))
+            ui.add(Button::new(text.color(palette.on_accent)).min_size(min_size))
         };
         ui.scope(coloured).inner
     }
 }
 
 /// Primary button.
-pub fn primary_button(text: impl Into<String>) -> PrimaryButton {
-    PrimaryButton {
-        text: text.into(),
-        min_size: vec2(0.0, space(7)),
-    }
+pub fn primary_button(text: impl Into<String>) -> impl Widget {
+    primary_button_of(text, vec2(0.0, space(7)))
 }
 
 /// Button as high as [`primary_button`], in the colour of controls.
@@ -216,28 +194,21 @@ pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)]
             for (&(tab, text), width) in tabs.iter().zip(widths) {
                 let is_selected = tab == selected;
                 let colour = if is_selected { palette.text } else { palette.dim };
-                let text = RichText::new(text).color(colour);
-                let text = if is_selected {
-                    text.font(semibold(type_size().body))
-                } else {
-                    text
-                };
-                let button = Button::new(text)
+                let mut shown = RichText::new(text).color(colour);
+                if is_selected {
+                    shown = shown.font(semibold(type_size().body));
+                }
+                let button = Button::new(shown)
                     .fill(Color32::TRANSPARENT)
                     .stroke(Stroke::NONE)
                     .min_size(vec2(width + 2.0 * padding, 0.0));
                 let tab_response = ui.add(button);
-                tab_response.widget_info(|| {
-                    egui::WidgetInfo::selected(egui::accesskit::Role::Tab, true, is_selected, tabs_text(tabs, tab))
-                });
-                if is_selected {
+                tab_response.widget_info(|| WidgetInfo::selected(Role::Tab, true, is_selected, text));
+                if is_selected || tab_response.hovered() {
                     let line = tab_response.rect.x_range().shrink(padding);
-                    ui.painter()
-                        .hline(line, tab_response.rect.bottom() + 1.0, Stroke::new(2.0, palette.accent));
-                } else if tab_response.hovered() {
-                    let line = tab_response.rect.x_range().shrink(padding);
-                    ui.painter()
-                        .hline(line, tab_response.rect.bottom() + 1.0, Stroke::new(2.0, palette.line));
+                    let colour = if is_selected { palette.accent } else { palette.line };
+                    let below = tab_response.rect.bottom() + 1.0;
+                    ui.painter().hline(line, below, Stroke::new(2.0, colour));
                 }
                 if tab_response.clicked() && !is_selected {
                     picked = Some(tab);
@@ -259,15 +230,9 @@ fn reading_order<'a, T>(ui: &Ui, options: &'a [T]) -> Vec<&'a T> {
     }
 }
 
-fn tabs_text<'a, T: PartialEq>(tabs: &[(T, &'a str)], tab: T) -> &'a str {
-    tabs.iter()
-        .find(|(other, _)| *other == tab)
-        .map_or("", |(_, text)| text)
-}
-
 fn name_group(ui: &Ui, id: Id, label: &str) {
     ui.ctx().accesskit_node_builder(id, |node| {
-        node.set_role(egui::accesskit::Role::Group);
+        node.set_role(Role::Group);
         node.set_label(label);
     });
 }
@@ -314,40 +279,33 @@ pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32, text: &str) -> Respo
 pub fn status_progress_ui(ui: &mut Ui, name: &str, share: f32) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         ui.set_max_width(space(40).min(ui.available_width()));
-        progress_bar_ui(ui, name, share, &percent(share));
+        progress_bar_ui(ui, name, share, &format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0)));
     });
-}
-
-fn percent(share: f32) -> String {
-    format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0))
 }
 
 /// Shows a sentence in the middle of an empty card: the reason why it is empty, and what to do.
 pub fn placeholder_ui(ui: &mut Ui, text: &str) {
-    let dim = Theme::of(ui).palette.dim;
-    let text = RichText::new(text).color(dim);
-    let width = ui.available_width().min(space(80));
-    let galley_height = 3.0 * type_size().body;
-    ui.vertical_centered(|ui| {
-        ui.add_space((0.5 * (ui.available_height() - galley_height)).max(0.0));
-        ui.set_max_width(width);
-        ui.label(text);
-    });
+    in_the_middle_ui(ui, 3.0 * type_size().body, text, |_| ());
 }
 
 /// Shows a sentence in the middle of an empty card, and a button that fills it. Returns true if the button was clicked.
 pub fn invitation_ui(ui: &mut Ui, text: &str, button: &str, is_possible: bool) -> bool {
+    in_the_middle_ui(ui, 3.0 * type_size().body + space(10), text, |ui| {
+        ui.add_space(space(2));
+        ui.add_enabled(is_possible, ghost_button(button)).clicked()
+    })
+}
+
+fn in_the_middle_ui<T>(ui: &mut Ui, height: f32, text: &str, below_ui: impl FnOnce(&mut Ui) -> T) -> T {
     let dim = Theme::of(ui).palette.dim;
     let width = ui.available_width().min(space(80));
-    let height = 3.0 * type_size().body + space(10);
-    let invited = ui.vertical_centered(|ui| {
+    let centred = ui.vertical_centered(|ui| {
         ui.add_space((0.5 * (ui.available_height() - height)).max(0.0));
         ui.set_max_width(width);
         ui.label(RichText::new(text).color(dim));
-        ui.add_space(space(2));
-        ui.add_enabled(is_possible, ghost_button(button)).clicked()
+        below_ui(ui)
     });
-    invited.inner
+    centred.inner
 }
 
 /// Shows a figure with its name, and its meaning as a tooltip.
@@ -365,45 +323,10 @@ pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, col
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let response = ui.add(Label::new(text(value).color(colour)).truncate());
             let label = format!("{name}: {value}");
-            value_under(ui, response.rect, value);
             response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
             response.on_hover_text(meaning);
         });
     });
-}
-
-/// Place in the window that the tour points at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Landmark {
-    /// Actual surface.
-    ActualSurface,
-    /// Array scale, hidden nodes and method.
-    Choices,
-    /// Button that starts a training.
-    Train,
-    /// Error table.
-    Errors,
-    /// Button of the Export menu.
-    Export,
-}
-
-impl Landmark {
-    fn id(self) -> Id {
-        Id::unique(("landmark", self))
-    }
-
-    /// Records where the landmark is drawn in this frame.
-    pub fn stands_at(self, ui: &Ui, rect: Rect) {
-        let seen = rect.intersect(ui.clip_rect());
-        let frame = ui.ctx().cumulative_frame_nr();
-        ui.data_mut(|data| data.insert_temp(self.id(), (frame, seen)));
-    }
-
-    /// Returns where the landmark is drawn in this frame; `None` if it is not in view.
-    pub fn place(self, ctx: &Context) -> Option<Rect> {
-        let (frame, rect) = ctx.data(|data| data.get_temp::<(u64, Rect)>(self.id()))?;
-        (frame == ctx.cumulative_frame_nr() && rect.is_positive()).then_some(rect)
-    }
 }
 
 /// Draws a focus ring around a widget that does not show the focus otherwise.
@@ -503,73 +426,43 @@ pub fn refusal_ui(ui: &mut Ui, field: &Response) {
     }
 }
 
-/// Shows a menu that copies the value as `shown`, or resets it to the `usual` value, given with its text.
-pub(super) fn menu_ui<T: Copy + PartialEq>(ui: &mut Ui, value: &mut T, shown: &str, usual: Option<(T, String)>) {
-    if ui.button(format!("Copy {shown}")).clicked() {
-        ui.ctx().copy_text(shown.to_owned());
-        ui.close();
-    }
-    if let Some((usual, text)) = usual.filter(|(usual, _)| usual != value)
-        && ui.button(format!("Reset to {text}")).clicked()
-    {
-        *value = usual;
-        ui.close();
-    }
-}
-
 /// Shows the number of the displayed snapshot or sample (`what`), which can be typed or dragged, with arrows to the previous
 /// and next one; returns a newly selected one.
 pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> Option<usize> {
     let mut picked = None;
-    let title = format!("Test {what}");
+    let mut arrow_ui = |ui: &mut Ui, sign: &str, to: Option<usize>, name: &str, key: &str| {
+        let arrow = ui.add_enabled(to.is_some(), Button::new(sign).min_size(Vec2::splat(space(6))));
+        let label = format!("{name} {what}");
+        arrow.widget_info(|| WidgetInfo::labeled(Role::Button, to.is_some(), &label));
+        if arrow
+            .on_hover_text(format!("{label} of the test set ({key})"))
+            .clicked()
+        {
+            picked = to;
+        }
+    };
     // The layout is right to left: next, number, previous.
-    let next = ui.add_enabled(shown + 1 < snapshots, arrow_button("›"));
-    if name(next, format!("Next {what}"))
-        .on_hover_text(format!("Next {what} of the test set (Page down)"))
-        .clicked()
-    {
-        picked = Some(shown + 1);
-    }
+    let next = Some(shown + 1).filter(|next| *next < snapshots);
+    arrow_ui(ui, "›", next, "Next", "Page down");
     let mut number = shown + 1;
-    let field = (snapshots > 0).then(|| {
-        let suffix = format!(" of {snapshots}");
-        let field = DragValue::new(&mut number).range(1..=snapshots).suffix(suffix);
-        ui.add(field).on_hover_text("Type a number, or drag.")
-    });
-    if field.is_none() {
-        ui.label("–");
-    } else if number != shown + 1 {
+    let suffix = format!(" of {}", snapshots.max(1));
+    let field = DragValue::new(&mut number).range(1..=snapshots.max(1)).suffix(suffix);
+    let field = ui
+        .add_enabled(snapshots > 0, field)
+        .on_hover_text("Type a number, or drag.");
+    arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
+    if number != shown + 1 && snapshots > 0 {
         picked = Some(number - 1);
     }
-    let previous = ui.add_enabled(shown > 0, arrow_button("‹"));
-    if name(previous, format!("Previous {what}"))
-        .on_hover_text(format!("Previous {what} of the test set (Page up)"))
-        .clicked()
-    {
-        picked = Some(shown - 1);
-    }
+    let title = format!("Test {what}");
     let dim = Theme::of(ui).palette.dim;
     let font = FontId::proportional(type_size().body);
-    let galley = ui.painter().layout_no_wrap(title.clone(), font, dim);
-    let label = (ui.available_width() >= galley.size().x).then(|| ui.label(RichText::new(&title).color(dim)));
-    match (field, label) {
-        (Some(field), Some(label)) => {
-            field.labelled_by(label.id);
-        }
-        (Some(field), None) => {
-            ui.ctx().accesskit_node_builder(field.id, |node| node.set_label(title));
-        }
-        (None, _) => {}
+    let width = ui.painter().layout_no_wrap(title.clone(), font, dim).size().x;
+    if ui.available_width() >= width {
+        let label = ui.label(RichText::new(&title).color(dim));
+        field.labelled_by(label.id);
+    } else {
+        ui.ctx().accesskit_node_builder(field.id, |node| node.set_label(title));
     }
     picked
-}
-
-fn arrow_button(text: &str) -> Button<'_> {
-    Button::new(text).min_size(Vec2::splat(space(6)))
-}
-
-fn name(response: Response, label: String) -> Response {
-    let is_enabled = response.enabled();
-    response.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, &label));
-    response
 }

@@ -6,12 +6,12 @@ use std::{cell::RefCell, fmt::Display, ops::RangeInclusive, str::FromStr};
 pub(crate) use decoupler_core::sensor::short as input_text;
 pub use decoupler_core::text::capitalised;
 use eframe::egui::{
-    Align, ComboBox, Context, CornerRadius, DragValue, Id, Key, Layout, Rect, Response, Sense, Slider, Stroke,
-    TextEdit, Ui, Vec2, emath::Numeric, vec2,
+    Align, ComboBox, CornerRadius, DragValue, Key, Layout, Response, Sense, Slider, Stroke, TextEdit, Ui, Vec2,
+    emath::Numeric, vec2,
 };
 
 use super::{
-    components::{menu_ui, refusal_ui, take_refusal},
+    components::{refusal_ui, take_refusal},
     explained_options_ui,
     quantity_text::parse,
 };
@@ -157,7 +157,7 @@ fn slider_style(ui: &mut Ui) {
 }
 
 /// Field for a value as text, which is applied when Enter is pressed or the field loses the focus. Invalid text is refused:
-/// the old value stays, and the reason is shown below the field. A right-click menu copies the value or resets it to `usual`.
+/// the old value stays, and the reason is shown below the field. A double click on it resets the value to `usual`.
 pub fn text_ui<T>(ui: &mut Ui, name: &str, hint: &str, value: &mut T, usual: T) -> Response
 where
     T: Copy + Display + FromStr<Err: Display> + PartialEq,
@@ -182,44 +182,12 @@ where
                 parsed.map_err(|error: T::Err| error.to_string())
             })
         };
-        claim_right_click(ui, &response);
-        let shown = value.to_string();
-        response.context_menu(|ui| menu_ui(ui, value, &shown, Some((usual, usual.to_string()))));
+        if response.double_clicked() && !response.has_focus() {
+            *value = usual;
+        }
         take_refusal(ui, &response, tried, &value.to_string());
         response
     })
-}
-
-fn id() -> Id {
-    Id::unique("value under the pointer")
-}
-
-/// Registers `text` as the value shown in `rect`, so that a right click there can copy it.
-pub fn value_under(ui: &Ui, rect: Rect, text: &str) {
-    if ui.input(|input| input.pointer.secondary_clicked()) && ui.rect_contains_pointer(rect) {
-        ui.data_mut(|data| data.insert_temp(id(), text.to_owned()));
-    }
-}
-
-/// Returns the value that was right-clicked in this frame, once.
-pub fn take_value_under(ctx: &Context) -> Option<String> {
-    ctx.data_mut(|data| data.remove_temp(id()))
-}
-
-fn claim_id() -> Id {
-    Id::unique("right click is handled")
-}
-
-/// Registers that a widget has its own menu for right clicks.
-pub fn claim_right_click(ui: &Ui, widget: &Response) {
-    if widget.secondary_clicked() {
-        ui.data_mut(|data| data.insert_temp(claim_id(), true));
-    }
-}
-
-/// Returns true, once, if a widget handles the right click of this frame.
-pub fn take_claim(ctx: &Context) -> bool {
-    ctx.data_mut(|data| data.remove_temp(claim_id())).unwrap_or(false)
 }
 
 /// Range and default of a field.
@@ -317,14 +285,6 @@ fn typed_number_ui<N: Numeric>(
         *value = usual;
         response.surrender_focus();
     }
-    claim_right_click(ui, &response);
-    let shown = if *value == before {
-        format!("{shown} {unit}").trim_end().to_owned()
-    } else {
-        with_unit(*value, unit)
-    };
-    let usual = limits.usual.map(|usual| (usual, with_unit(usual, unit)));
-    response.context_menu(|ui| menu_ui(ui, value, &shown, usual));
     if *value != before {
         response.mark_changed();
     }
@@ -334,10 +294,6 @@ fn typed_number_ui<N: Numeric>(
     });
     take_refusal(ui, &response, tried, &value.to_f64().to_string());
     (response, typed)
-}
-
-fn with_unit<N: Numeric>(value: N, unit: &str) -> String {
-    format!("{} {unit}", input_text(value.to_f64())).trim_end().to_owned()
 }
 
 /// Usual size of a field, in points.

@@ -6,11 +6,9 @@ mod quantity_text;
 mod table;
 
 pub use components::{
-    Landmark, card_ui, coloured_fact_ui, dim_ui, explained_options_ui, fact_ui, focus_ring_ui, fold_ui, ghost_button,
-    invitation_ui, note_ui, placeholder_ui, primary_button, progress_bar_ui, refusal_ui, scrolled_ui,
-    section_heading_ui, segmented_ui, snapshot_ui, state_ui, status_progress_ui, tabs_ui, with_shortcut,
+    card_ui, coloured_fact_ui, dim_ui, explained_options_ui, fact_ui, focus_ring_ui, fold_ui, ghost_button,
+    invitation_ui, note_ui, placeholder_ui, primary_button, primary_button_of, progress_bar_ui, refusal_ui,
+    scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui, state_ui, status_progress_ui, tabs_ui, with_shortcut,
 };
-pub use fields::{
-    claim_right_click, number_ui, slider_ui, take_claim, take_value_under, text_ui, usually, value_under,
-};
+pub use fields::{number_ui, slider_ui, text_ui, usually};
 pub use table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, described_table_ui};

@@ -1,5 +1,3 @@
-use std::io::{self, Write};
-
 use super::{Cell, Table, TableColumn, format_number, format_percent, table::cell};
 use crate::import::{Recording, SetupSets};
 use decoupler_core::{
@@ -159,28 +157,20 @@ pub fn describe_search(record: &AutoRecord) -> String {
     )
 }
 
-/// Writes the errors of every epoch as CSV, formatted as by [`Table::write_csv`].
-///
-/// # Errors
-/// Any error of `writer`.
-pub fn write_loss_curves(history: &[EpochRecord], writer: &mut dyn Write) -> io::Result<()> {
-    writeln!(
-        writer,
-        "epoch,training_mse,validation_mse,test_mse,gradient_norm,parameter,effective_parameters"
-    )?;
-    let text = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
-    for record in history {
-        let values = [
-            Some(record.training_mse),
-            record.validation_mse,
-            record.test_mse,
-            Some(record.gradient_norm),
-            Some(record.parameter),
-            record.effective_parameters,
-        ];
-        writeln!(writer, "{},{}", record.epoch, values.map(text).join(","))?;
-    }
-    Ok(())
+/// Returns the errors of every epoch.
+pub fn loss_table(history: &[EpochRecord]) -> Table {
+    let row = |record: &EpochRecord| {
+        vec![
+            cell("epoch", record.epoch),
+            cell("training_mse", record.training_mse),
+            cell("validation_mse", record.validation_mse),
+            cell("test_mse", record.test_mse),
+            cell("gradient_norm", record.gradient_norm),
+            cell("parameter", record.parameter),
+            cell("effective_parameters", record.effective_parameters),
+        ]
+    };
+    Table::of_rows(history.iter().map(row))
 }
 
 /// Warns of targets that the readings explain little of or that could not be judged; `measured` has an entry for each target.
@@ -401,8 +391,8 @@ mod tests {
             validation_failures: 0,
         };
         let mut table = Vec::new();
-        write_loss_curves(&[record], &mut table).unwrap();
+        loss_table(&[record]).write_csv(&mut table).unwrap();
         let text = String::from_utf8(table).unwrap();
-        assert_eq!(text.lines().nth(1), Some("3,0.30000000000000004,,1e-300,inf,0.001,"));
+        assert_eq!(text.lines().nth(1), Some("3,0.30000000000000004,,1e-300,,0.001,"));
     }
 }

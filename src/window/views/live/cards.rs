@@ -1,39 +1,133 @@
-use std::sync::Arc;
+//! The cards in the middle: the decoded surfaces, the readings or the values over time, and the figures of the stream.
 
-use decoupler_core::{live::FaultyWire, sensor::ArrayScale};
+use std::ops::RangeInclusive;
+
+use decoupler_core::{live::ZeroGains, text::counted};
 use decoupler_files::{
-    export::format_number,
+    export::{format_duration, format_number},
     figure::{
-        HeatMap, SequentialMap, readings_figure,
-        surface::{Quantity, Surface, SurfaceFigure},
+        HeatMap,
+        surface::{Surface, SurfaceFigure},
     },
-    live::{ConverterEnd, Fault, FaultEffect, SourcePlan, Watched},
+    live::{SourcePlan, Tally},
 };
-use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
+use eframe::egui::{Align, Label, Layout, Rect, RichText, Sense, Slider, Ui, Vec2, WidgetInfo};
 
-use super::{LiveView, engine::LiveFrame, source_form::SourceKind};
+use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
-    plotting::cells_ui,
-    shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
+    plotting::{cells_ui, titled_plots_ui},
+    shared::{Command, Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
-    test_view::{Frame, HeightScale},
     theme::{Theme, semibold, space, type_size},
     widgets::{
-        card_ui,
-        fields::{count_ui, list_ui, options_ui, quantity_ui},
-        ghost_button, note_ui, primary_button,
+        card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
+        section_heading_ui, slider_ui,
     },
 };
 
-/// Shows the decoupled surface, the actual one next to it if it is known, and their colour scale.
-pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let Some(frame) = &view.shown.frame else { return };
-    let figure = surface_figure(frame, view.node, shared.look);
+/// Shows the answers above, the readings or values and the figures below, and the replay bar at the bottom.
+pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let whole = ui.available_rect_before_wrap();
+    let Some(answer) = view.shown.answer.clone() else {
+        card_ui(ui, whole, |ui| invitation_ui(ui, view, shared, effects));
+        ui.allocate_rect(whole, Sense::hover());
+        return;
+    };
+    let gap = space(2);
+    let mut cards = whole;
+    if view.shown.replay.is_some() {
+        let (rest, bar) = whole.split_top_bottom_at_y(whole.bottom() - REPLAY_BAR_HEIGHT);
+        card_ui(ui, bar, |ui| replay_bar_ui(ui, view, shared, effects));
+        cards = rest.with_max_y(rest.bottom() - gap);
+    }
+    let lower_height = (0.46 * cards.height()).clamp(space(60), space(100));
+    let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
+    let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
+    let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
+    let mut upper = upper.with_max_y(upper.bottom() - gap);
+    let left = left.with_max_x(left.right() - gap);
+    if let Some(readings) = &answer.readings {
+        let readings = readings.clone().coloured(shared.look.colours);
+        card_ui(ui, left, |ui| readings_ui(ui, &readings, &answer.faulty));
+    }
+    if let Some(chart) = &answer.chart {
+        let (surface, beside) = upper.split_left_right_at_x(upper.center().x);
+        let place = if answer.surfaces.is_empty() { upper } else { beside };
+        let title = match answer.network.intervals {
+            Some(_) => "Decoded values with their 90 % intervals",
+            None => "Decoded values",
+        };
+        card_ui(ui, place, |ui| titled_plots_ui(ui, title, chart));
+        let values_ui = |ui: &mut Ui| values_ui(ui, &answer);
+        card_ui(ui, left, |ui| scrolled_ui(ui, "live targets", values_ui));
+        upper = surface;
+    }
+    surfaces_ui(ui, upper, view, shared.look, effects);
+    card_ui(ui, right, |ui| {
+        scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, &answer, shared, effects));
+    });
+    ui.allocate_rect(whole, Sense::hover());
+}
+
+/// Height of the replay bar, in points.
+const REPLAY_BAR_HEIGHT: f32 = space(12);
+
+/// Shows the position in the recording and the speed.
+fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let Some(replay) = view.shown.replay else { return };
+    if view.running.is_none() {
+        ui.disable();
+    }
+    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+        command_ui(ui, &Command::PlayReplay, view, shared, effects);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let text = RichText::new(format!("{:.1}×", view.source.speed)).size(type_size().note);
+            ui.add_sized([space(8), space(6)], Label::new(text));
+            if bar_slider_ui(ui, "Replay speed", (&mut view.source.speed, 1.0), 0.1..=10.0, space(24)) {
+                view.steer();
+            }
+            dim_ui(ui, "Speed");
+            ui.add_space(space(2));
+            let text = format!("{:.2} of {:.2} s", replay.at_s, replay.length_s);
+            ui.label(RichText::new(text).size(type_size().note));
+            let mut at_s = replay.at_s;
+            let (length_s, width) = (replay.length_s.max(f64::MIN_POSITIVE), ui.available_width() - space(2));
+            if bar_slider_ui(ui, "Replay position", (&mut at_s, 0.0), 0.0..=length_s, width) {
+                view.control(move |control, now| control.seek(at_s, now));
+            }
+        });
+    });
+}
+
+/// Shows a slider that a double click resets to `usual`; returns true if its value has changed.
+fn bar_slider_ui(
+    ui: &mut Ui,
+    name: &str,
+    (value, usual): (&mut f64, f64),
+    range: RangeInclusive<f64>,
+    width: f32,
+) -> bool {
+    let before = *value;
+    let is_logarithmic = *range.start() > 0.0;
+    let slider = slider_ui(ui, Slider::new(value, range).logarithmic(is_logarithmic), width);
+    if slider.double_clicked() {
+        *value = usual;
+    }
+    slider.widget_info(|| WidgetInfo::slider(ui.is_enabled(), before, name));
+    slider.on_hover_text("A double click resets it.");
+    *value != before
+}
+
+/// Shows the decoded surface, the actual one next to it if it is known, and their colour scale.
+fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, look: Look, effects: &mut Vec<Effect>) {
+    let (Some(answer), node) = (&view.shown.answer, &mut view.node) else {
+        return;
+    };
+    let figure = surface_figure(answer, *node, look);
     let gap = space(2);
     let (cards, scale) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
     let count = figure.surfaces.len() as f32;
     let width = (cards.width() - gap * (count - 1.0)) / count;
-    let mut node = view.node;
     for (index, surface) in figure.surfaces.iter().enumerate() {
         let left = cards.left() + (width + gap) * index as f32;
         let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
@@ -41,42 +135,44 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared
             ui.horizontal(|ui| {
                 ui.set_min_height(space(7));
                 ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    if index == 0 {
-                        view_mode_ui(ui, shared.look, effects);
-                    }
-                });
+                if index == 0 {
+                    let at_right = Layout::right_to_left(Align::Center);
+                    ui.with_layout(at_right, |ui| view_mode_ui(ui, look, effects));
+                }
             });
-            surface_ui(ui, surface, frame, shared.look, &mut node, effects);
+            let shown = SurfaceView {
+                label: &format!("Live {} surface", surface.title.to_lowercase()),
+                surface,
+                marked_node: *node,
+                lit_nodes: &[],
+                section: None,
+                theme: Theme::of(ui),
+            }
+            .show(ui, look.camera);
+            follow_surface(&shown, look, node, effects);
+            shown.node_tooltip_ui(|ui, node| {
+                let name = answer.nodes.get(node).map_or("", String::as_str);
+                ui.label(RichText::new(name).font(semibold(type_size().note)));
+                let unit = if answer.readings.is_some() { " mm" } else { "" };
+                let values = answer.surfaces.iter().filter_map(|surface| {
+                    let value = format_number(surface.nodes.get(node)?.z);
+                    Some(format!("{} {value}{unit}", surface.title.to_lowercase()))
+                });
+                ui.label(RichText::new(Vec::from_iter(values).join(", ")).size(type_size().note));
+            });
         });
     }
     if let [colours, ..] = &figure.scales()[..] {
         let slot = scale.shrink2(Vec2::new(0.0, space(4)));
-        colour_scale_ui(ui, slot, colours, &figure.note(), shared.look, effects);
+        colour_scale_ui(ui, slot, colours, &figure.note(), look, effects);
     }
-    view.node = node;
 }
 
-/// Returns the surfaces of a frame on a common scale.
-pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
-    let surface = |title: &str, heights: &Frame| Surface {
-        title: title.to_owned(),
-        map: Arc::clone(&frame.surface),
-        values: Arc::clone(&heights.grid_mm),
-        nodes: Arc::clone(&heights.nodes_mm),
-        quantity: Quantity::Height,
-        range: match look.heights {
-            HeightScale::Stroke => frame.z_range_mm.clone(),
-            HeightScale::Fitted => heights.range_mm().unwrap_or_else(|| frame.z_range_mm.clone()),
-        },
-        mode: look.mode,
-        colours: look.colours,
-    };
-    let actual = frame.actual.as_ref().map(|actual| surface("Actual", actual));
+/// Returns the surfaces of an answer on a common scale.
+pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
+    let dressed = |surface: &Surface| look.dressed(surface, surface.title.clone());
     SurfaceFigure {
-        surfaces: std::iter::once(surface("Decoupled", &frame.decoupled))
-            .chain(actual)
-            .collect(),
+        surfaces: answer.surfaces.iter().map(dressed).collect(),
         camera: look.camera,
         marked_node,
         ..SurfaceFigure::default()
@@ -84,361 +180,168 @@ pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look)
     .with_common_scales()
 }
 
-fn surface_ui(
-    ui: &mut Ui,
-    surface: &Surface,
-    frame: &LiveFrame,
-    look: Look,
-    node: &mut Option<usize>,
-    effects: &mut Vec<Effect>,
-) {
-    let shown = SurfaceView {
-        label: &format!("Live {} surface", surface.title.to_lowercase()),
-        surface,
-        marked_node: *node,
-        lit_nodes: &[],
-        section: None,
-        theme: Theme::of(ui),
-    }
-    .show(ui, look.camera);
-    follow_surface(&shown, look, node, effects);
-    shown.node_tooltip_ui(|ui, node| {
-        let per_row = frame.sensor.scale.nodes_per_row();
-        let (Some(decoupled), Some(row)) = (frame.decoupled.nodes_mm.get(node), frame.rows.get(node / per_row)) else {
-            return;
-        };
-        let name = format!("Row {}, node {}", row + 1, node % per_row + 1);
-        ui.label(RichText::new(name).font(semibold(type_size().note)));
-        let mut text = format!("decoupled z {} mm", format_number(decoupled.z));
-        if let Some(actual) = frame.actual.as_ref().and_then(|actual| actual.nodes_mm.get(node)) {
-            text += &format!(", actual {} mm", format_number(actual.z));
-        }
-        ui.label(RichText::new(text).size(type_size().note));
-    });
-}
-
-/// Upper limit of the colour scale of the readings. It follows the largest drop in round steps and falls slowly, which
-/// keeps colours comparable from frame to frame.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DropScale {
-    peak_percent: f64,
-    watched: Option<Watched>,
-}
-
-/// Minimum of the upper limit, in percent.
-const MIN_PERCENT: f64 = 0.5;
-/// Decay of the peak per frame.
-const DECAY: f64 = 0.999;
-
-impl DropScale {
-    /// Updates the limit with a frame; faulty wires do not count.
-    pub fn take(&mut self, frame: &LiveFrame) {
-        let is_healthy = |row: usize, column: usize| !frame.watched.leaves_out(frame.rows[row], column);
-        let drops = frame.drops_percent.indexed_iter();
-        let drops = drops.filter(|((row, column), drop)| is_healthy(*row, *column) && drop.is_finite());
-        let largest = drops.map(|(_, &drop)| drop).fold(0.0, f64::max);
-        if self.watched.as_ref() != Some(&frame.watched) {
-            // Discard the peak that a fault has caused.
-            self.watched = Some(frame.watched.clone());
-            self.peak_percent = 0.0;
-        }
-        self.peak_percent = largest.max(DECAY * self.peak_percent);
-    }
-
-    /// Returns the upper limit in percent: 1, 2 or 5 times a power of ten.
-    pub fn largest_percent(&self) -> f64 {
-        let peak = self.peak_percent.max(MIN_PERCENT);
-        let decade = 10_f64.powf(peak.log10().floor());
-        let steps = [1.0, 2.0, 5.0].map(|step| step * decade);
-        steps
-            .into_iter()
-            .find(|step| *step >= peak * (1.0 - 1e-9))
-            .unwrap_or(10.0 * decade)
-    }
-}
-
 /// Shows the text of an empty view, and the button that starts decoding.
-pub fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let palette = Theme::of(ui).palette;
+fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let (heading, text, button) = invitation(view, shared);
     ui.vertical_centered(|ui| {
         ui.add_space((0.5 * ui.available_height() - space(20)).max(0.0));
         ui.set_max_width(ui.available_width().min(space(105)));
-        let (heading, text) = words(view, shared);
         ui.label(RichText::new(heading).font(semibold(type_size().title)));
         ui.add_space(space(1));
-        ui.label(RichText::new(text).color(palette.dim));
+        ui.label(RichText::new(text).color(Theme::of(ui).palette.dim));
         ui.add_space(space(4));
-        if view.running.is_some() {
-            return;
-        }
-        if view.network.network(&shared.runs).is_none() {
-            let is_free = !shared.phase.is_busy();
-            if is_free && ui.add(primary_button("Train a network now")).clicked() {
-                effects.extend([Effect::ShowTraining, Effect::Train]);
+        if button.is_some_and(|button| ui.add(primary_button(button)).clicked()) {
+            match button {
+                Some(TRAIN) => effects.extend([Effect::ShowTraining, Effect::Train]),
+                _ => view.start(shared, effects),
             }
-        } else if view.source.kind == SourceKind::Simulated && view.has_sensor(shared) {
-            if ui.add(primary_button("Start the simulated source")).clicked() {
-                view.start(shared, effects);
-            }
-        } else if view.obstacle(shared).is_none() && ui.add(primary_button("Start this source")).clicked() {
-            view.start(shared, effects);
         }
         ui.add_space(space(2));
         let hint = "Four seconds of a ball that wanders over a simulated array, with a network that decodes them.";
         let sample = ui.add(ghost_button("Play the sample recording"));
         if sample.on_hover_text(hint).clicked() {
-            view.ask_for_sample(shared);
+            view.play_sample(shared);
         }
     });
 }
 
-fn words(view: &LiveView, shared: &Shared) -> (String, String) {
-    let (counts, network) = (&view.shown.counts, view.network.network(&shared.runs));
+/// Buttons and heading of an empty view.
+const TRAIN: &str = "Train a network now";
+const START: &str = "Start this source";
+const HEADING: &str = "Decode live readings";
+
+/// Returns the heading and the text of an empty view, and its button.
+fn invitation(view: &LiveView, shared: &Shared) -> (&'static str, String, Option<&'static str>) {
     if let Some(running) = &view.running {
-        let source = match &running.source {
-            SourcePlan::Simulated(_) => "the simulated source".to_owned(),
-            SourcePlan::Replay(path) => format!("'{}'", path.display()),
-            SourcePlan::Stream(source) => source.to_string(),
+        let text = match &view.shown.counts.last_bad {
+            Some(reason) => format!("Malformed lines: {}. Last: {reason}.", view.shown.counts.bad),
+            None => format!("It appears here as soon as it arrives from {}.", running.source_text()),
         };
-        let text = match &counts.last_bad {
-            Some(reason) => format!("Malformed lines: {}. Last: {reason}.", counts.bad),
-            None => "It appears here as soon as it arrives.".to_owned(),
-        };
-        return (format!("Waiting for the first frame from {source}"), text);
+        return ("Waiting for the first frame", text, None);
     }
-    let Some((name, _)) = network else {
-        let text = if shared.phase.is_busy() {
-            "Live decoding needs a trained network. One is being trained in the Train view: it can be used here as soon \
-             as it is finished."
-        } else {
-            "Live decoding needs a trained network. Train one with the settings of the Train view, which takes from \
-             seconds to minutes, or open a network file."
-        };
-        return ("No network yet".to_owned(), text.to_owned());
+    let Some((name, file)) = view.network(shared) else {
+        let is_busy = shared.phase.is_busy();
+        let mut text =
+            "Train one with the settings of the Train view, which takes seconds to minutes, or open a network file.";
+        if is_busy {
+            text = "One is being trained in the Train view: it can be used here as soon as it is finished.";
+        }
+        let text = format!("Live decoding needs a trained network. {text}");
+        return ("No network yet", text, (!is_busy).then_some(TRAIN));
     };
-    let text = match view.source.kind {
-        SourceKind::Simulated if view.has_sensor(shared) => format!(
-            "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any \
-             hardware. To decode your own, choose a replay, a serial port or a TCP address on the left."
+    let text = match view.plan(shared).map(|(_, plan)| plan.source) {
+        Err(obstacle) => return (HEADING, obstacle, None),
+        Ok(SourcePlan::Simulated(_)) => format!(
+            "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any hardware. To \
+             decode your own, choose a replay, a serial port or a TCP address on the left."
         ),
-        _ => match view.obstacle(shared) {
-            Some(obstacle) => obstacle,
-            None if view.has_sensor(shared) => format!("The network '{name}' decodes its frames as they arrive."),
-            None => format!("The network '{name}' decodes its samples as they arrive, by the names of their columns."),
-        },
+        Ok(_) if file.problem.sensor.is_some() => format!("The network '{name}' decodes its frames as they arrive."),
+        Ok(_) => format!("The network '{name}' decodes its samples as they arrive, by the names of their columns."),
     };
-    ("Decode live readings".to_owned(), text)
+    (HEADING, text, Some(START))
 }
 
-/// Shows the readings of the frame as a map of rows and columns.
-pub fn readings_ui(ui: &mut Ui, view: &LiveView, colours: SequentialMap) {
-    let Some(frame) = &view.shown.frame else { return };
+/// Shows the readings of an array as a map of rows and columns, with the faulty wires marked.
+fn readings_ui(ui: &mut Ui, readings: &HeatMap, [rows, columns]: &[Vec<usize>; 2]) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new("Readings").font(semibold(type_size().title)));
     });
-    let map = figure_of(frame, view.drops.largest_percent()).coloured(colours);
-    let (rows, columns) = marked(frame);
-    let warning = Theme::of(ui).palette.warning;
-    let marks = (&*rows, &*columns, warning);
-    let Some(([row, column], cell)) = cells_ui(ui, "Live readings", &map, marks) else {
+    let marks = (&**rows, &**columns, Theme::of(ui).palette.warning);
+    if let Some(([row, column], cell)) = cells_ui(ui, "Live readings", readings, marks) {
+        let drop_percent = format_number(readings.values[[row, column]]);
+        let (row, column) = (&readings.rows[row], &readings.columns[column]);
+        cell.on_hover_text_at_pointer(format!(
+            "Row-wire {row}, column-wire {column}\ndrop from unloaded: {drop_percent} %"
+        ));
+    }
+}
+
+/// Shows the latest value of each target, with its uncertainty.
+fn values_ui(ui: &mut Ui, answer: &Answered) {
+    section_heading_ui(ui, "Targets");
+    let intervals = answer.network.intervals.as_ref();
+    for (index, (target, &value)) in answer.network.problem.targets.iter().zip(&answer.values).enumerate() {
+        let half_width = intervals.and_then(|intervals| intervals.half_width(index, value));
+        let half_width = half_width.map(|half_width| format!(" ± {}", format_number(half_width)));
+        let hint = "Latest decoded value, ± half-width of its 90 % prediction interval if the network has one.";
+        let value = format!("{}{}", format_number(value), half_width.unwrap_or_default());
+        fact_ui(ui, &target.title(), hint, &value);
+    }
+}
+
+/// Shows confidence, the stream, and of an array the unloaded state and the recording; warnings above everything else.
+fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shared, effects: &mut Vec<Effect>) {
+    if let Some((_, consequence)) = &answer.fault {
+        note_ui(ui, consequence);
+    }
+    section_heading_ui(ui, "Confidence");
+    let palette = Theme::of(ui).palette;
+    for fact in &answer.confidence {
+        let colour = if fact.warns { palette.warning } else { palette.text };
+        coloured_fact_ui(ui, fact.name, &fact.hint, &fact.value, colour);
+    }
+    section_heading_ui(ui, "Stream");
+    stream_ui(ui, &view.shown.counts);
+    if answer.readings.is_some() {
+        zero_ui(ui, view);
+        recording_ui(ui, view, shared, effects);
+    }
+    ui.add_space(space(2));
+}
+
+/// Shows rate, latency and losses of the stream.
+fn stream_ui(ui: &mut Ui, counts: &Tally) {
+    let rate = match counts.is_waiting {
+        true => "waiting".to_owned(),
+        false => format!("{:.0} frames per second", counts.frames_per_second),
+    };
+    fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
+    let hint = "Time from reading a frame to its answer: median and 99th percentile.";
+    let quantile = |share| counts.latencies.quantile(share);
+    let [median, high] = [0.5, 0.99].map(|share| quantile(share).map_or_else(|| format_number(None), format_duration));
+    fact_ui(ui, "Latency", hint, &format!("p50 {median}, p99 {high}"));
+    fact_ui(ui, "Decoded", "Frames since the start.", &counts.decoded.to_string());
+    let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
+    fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
+    let hint = "Malformed lines, and frames that could not be decoded.";
+    fact_ui(ui, "Bad", hint, &counts.bad.to_string());
+    if let Some(reason) = &counts.last_bad {
+        dim_ui(ui, &format!("Last: {reason}"));
+    }
+}
+
+fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
+    let Some(ZeroGains { gains, in_contact, .. }) = &view.shown.zero else {
         return;
     };
-    let value = format_number(map.values[[row, column]]);
-    let row = frame.rows.get(row).map_or(0, |row| row + 1);
-    cell.on_hover_text_at_pointer(format!(
-        "Row-wire {row}, column-wire {}\ndrop from unloaded: {value} %",
-        column + 1
-    ));
+    section_heading_ui(ui, "Zero");
+    let low = gains.iter().copied().fold(f64::MAX, f64::min);
+    let high = gains.iter().copied().fold(f64::MIN, f64::max);
+    let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest.";
+    fact_ui(ui, "Gains", hint, &format!("{low:.4} to {high:.4}"));
+    let touched = in_contact.iter().filter(|touched| **touched).count();
+    let touched = format!("{touched} of {}", in_contact.len());
+    let hint = "Of rows in contact only the gains of their columns were taken, so that the contact is kept.";
+    fact_ui(ui, "Rows in contact", hint, &touched);
+    let clear = ui.add(ghost_button("Clear zero"));
+    let hint = "Compares readings with the model at rest again.";
+    if clear.on_hover_text(hint).clicked() {
+        view.clear_zero();
+    }
 }
 
-/// Returns the map of the readings of a frame.
-pub fn figure_of(frame: &LiveFrame, largest_percent: f64) -> HeatMap {
-    readings_figure(frame.drops_percent.clone(), &frame.rows, largest_percent)
-}
-
-/// Returns the rows and columns of the map whose wires are faulty.
-fn marked(frame: &LiveFrame) -> (Vec<usize>, Vec<usize>) {
-    let Some(wire) = frame.watched.wire() else {
-        return (Vec::new(), Vec::new());
+fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    // The status line shows one that is under way.
+    let Some(recorded) = view.shown.recorded.clone().filter(|_| !view.is_recording()) else {
+        return;
     };
-    let rows = frame.rows.iter().enumerate();
-    let rows = rows
-        .filter(|(_, row)| wire == FaultyWire::Row(**row))
-        .map(|(place, _)| place);
-    (rows.collect(), wire.columns().collect())
-}
-
-/// Form of the fault of the simulated wires.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FaultForm {
-    kind: Option<FaultKind>,
-    /// Row-wire or column-wire, from 1; the first of two shorted wires.
-    wire: usize,
-    /// Node before which a wire is broken, from 1.
-    node: usize,
-    gain_percent: f64,
-    end: ConverterEnd,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum FaultKind {
-    BrokenRow,
-    BrokenColumn,
-    ShortedColumns,
-    Gain,
-    Saturated,
-}
-
-impl Default for FaultForm {
-    fn default() -> Self {
-        Self {
-            kind: None,
-            wire: 3,
-            node: 1,
-            gain_percent: 5.0,
-            end: ConverterEnd::High,
-        }
-    }
-}
-
-impl FaultForm {
-    /// Returns the fault in an array of this scale; the number of the wire is limited to that of the last wire.
-    pub fn fault(&self, scale: ArrayScale) -> Option<Fault> {
-        let last = self.kind?.wires(scale);
-        let (wire, node) = (self.wire.clamp(1, last.max(1)) - 1, self.node.max(1) - 1);
-        let column = FaultyWire::Column(wire);
-        let (wire, effect) = match self.kind? {
-            FaultKind::BrokenRow => (
-                FaultyWire::Row(wire),
-                FaultEffect::Open(node.min(scale.nodes_per_row() - 1)),
-            ),
-            FaultKind::BrokenColumn => (column, FaultEffect::Open(node.min(scale.nodes_per_column() - 1))),
-            FaultKind::ShortedColumns => (FaultyWire::Columns(wire), FaultEffect::Shorted),
-            FaultKind::Gain if self.gain_percent == 0.0 => return None,
-            FaultKind::Gain => (column, FaultEffect::Gain(self.gain_percent / 100.0)),
-            FaultKind::Saturated => (column, FaultEffect::Stuck(self.end)),
-        };
-        Some(Fault { wire, effect })
-    }
-
-    /// Shows the form for an array of this scale in which these row-wires are read.
-    pub fn form_ui(&mut self, ui: &mut Ui, scale: ArrayScale, read: &[usize]) {
-        let hint = "A fault of the simulated wires or electronics, which takes effect at once.";
-        if let Some(kind) = list_ui(ui, "Wire fault", hint, &KINDS, self.kind) {
-            self.kind = kind;
-        }
-        let Some(kind) = self.kind else { return };
-        let (name, hint) = kind.wire_field();
-        let last = kind.wires(scale).max(1);
-        self.wire = self.wire.clamp(1, last);
-        count_ui(ui, name, hint, &mut self.wire, 1..=last);
-        match kind {
-            FaultKind::BrokenRow | FaultKind::BrokenColumn => {
-                let nodes = match kind {
-                    FaultKind::BrokenRow => scale.nodes_per_row(),
-                    _ => scale.nodes_per_column(),
-                };
-                self.node = self.node.clamp(1, nodes);
-                let hint = "Node before which the wire is broken, counted from its connector: before node 1 it is \
-                            broken at the connector.";
-                count_ui(ui, "Before node", hint, &mut self.node, 1..=nodes);
-            }
-            FaultKind::Gain => {
-                let hint = "Error of the amplifier's gain, in percent: all readings of the column-wire are too large by \
-                            this much.";
-                quantity_ui(ui, "Gain error", hint, &mut self.gain_percent, -90.0..=1000.0, "%");
-            }
-            FaultKind::Saturated => {
-                let ends = [
-                    (ConverterEnd::Low, "Low", "At its first step."),
-                    (ConverterEnd::High, "High", "At its full scale."),
-                ];
-                let hint = "End of the converter's range at which it is stuck.";
-                self.end = options_ui(ui, "Stuck at", hint, &ends, self.end).unwrap_or(self.end);
-            }
-            FaultKind::ShortedColumns => {}
-        }
-        if let Some(problem) = self.problem(scale, read) {
-            note_ui(ui, &format!("This fault is not possible: {problem}."));
-        }
-    }
-
-    /// Returns the reason why the array cannot have this fault, if there is one.
-    pub fn problem(&self, scale: ArrayScale, read: &[usize]) -> Option<String> {
-        let checked = self.fault(scale)?.check(scale, read);
-        checked.err().map(|error| error.to_string())
-    }
-}
-
-const KINDS: [(Option<FaultKind>, &str, &str); 6] = [
-    (None, "None", "No wire is faulty."),
-    (
-        Some(FaultKind::BrokenRow),
-        "Broken row-wire",
-        "Its nodes beyond the break carry no current.",
-    ),
-    (
-        Some(FaultKind::BrokenColumn),
-        "Broken column-wire",
-        "Its nodes beyond the break carry no current.",
-    ),
-    (
-        Some(FaultKind::ShortedColumns),
-        "Shorted column-wires",
-        "Two neighbours touch, and read the same.",
-    ),
-    (
-        Some(FaultKind::Gain),
-        "Gain drift",
-        "The amplifier of a column-wire has drifted.",
-    ),
-    (
-        Some(FaultKind::Saturated),
-        "Saturated converter",
-        "The converter of a column-wire is stuck at an end of its range.",
-    ),
-];
-
-impl FaultKind {
-    /// Returns the number of wires that can have it.
-    fn wires(self, scale: ArrayScale) -> usize {
-        match self {
-            Self::BrokenRow => scale.rows(),
-            Self::ShortedColumns => scale.columns().saturating_sub(1),
-            Self::BrokenColumn | Self::Gain | Self::Saturated => scale.columns(),
-        }
-    }
-
-    fn wire_field(self) -> (&'static str, &'static str) {
-        match self {
-            Self::BrokenRow => ("Row-wire", "Number of the broken row-wire."),
-            Self::ShortedColumns => ("First column-wire", "It touches the next one."),
-            Self::BrokenColumn | Self::Gain | Self::Saturated => ("Column-wire", "Number of the column-wire."),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_scale_ends_at_round_numbers() {
-        for (peak_percent, expected) in [
-            (0.0, 0.5),
-            (0.6, 1.0),
-            (1.0, 1.0),
-            (1.3, 2.0),
-            (4.9, 5.0),
-            (73.0, 100.0),
-        ] {
-            let scale = DropScale {
-                peak_percent,
-                watched: None,
-            };
-            let found = scale.largest_percent();
-            assert!((found / expected - 1.0).abs() < 1e-9, "{peak_percent}: {found}");
-        }
+    section_heading_ui(ui, "Recording");
+    let length = format!("{}, {:.1} s", counted(recorded.frames, "frame"), recorded.seconds);
+    dim_ui(ui, &format!("Recorded {length}.")).on_hover_text(recorded.path.display().to_string());
+    let replay = ui.add_enabled(recorded.frames > 0, ghost_button("Replay recording"));
+    let hint = "Replays it with the network on the left. Export saves a copy of it.";
+    if replay.on_hover_text(hint).clicked() {
+        view.replay(&recorded.path, shared, effects);
     }
 }

@@ -1,16 +1,12 @@
 //! The Live view: frames of an array, or samples for a network of a recording, decoded as they arrive from a simulated
 //! source, a file, a serial port or a socket.
 //!
-//! `engine` decodes in the background; `state` starts it, takes its events and sends it the user's commands; the other
-//! files show the form on the left and the cards in the middle.
+//! `engine` is the thread around the session that decodes. `view` starts it, displays its latest snapshot and sends it the
+//! user's changes; the other files show the form and the cards.
 
 mod cards;
 mod engine;
-mod figures_card;
-mod source_form;
-mod state;
-mod targets_card;
-mod tools;
+mod form;
 mod view;
 
-pub use state::LiveView;
+pub use view::LiveView;

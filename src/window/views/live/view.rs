@@ -1,151 +1,554 @@
-use eframe::egui::{RichText, Sense, Ui};
+use std::{
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        mpsc::{Receiver, Sender, channel},
+    },
+    time::Instant,
+};
+
+use decoupler_core::{problem::Channel, scene::Noise, text::counted};
+use decoupler_files::{
+    export::{Cell, NetworkFile, Table, TableColumn, atomic_write, is_same},
+    live::{Input, LiveArray, Recorded, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
+};
+use eframe::egui::{Ui, Widget};
 
 use super::{
-    LiveView,
-    cards::{invitation_ui, readings_ui, surfaces_ui},
-    figures_card::figures_ui,
-    source_form,
-    targets_card::targets_ui,
-    tools::{self, REPLAY_BAR_HEIGHT, live_exports, replay_bar_ui},
+    cards::{self, surface_figure},
+    engine::{Answered, LiveEvent, Request, Snapshot, run},
+    form::{NETWORK, Picked, SourceForm, SourceKind, form_ui},
 };
 use crate::window::{
-    shared::{Effect, Export, FileInUse, Offers, Shared, View},
-    theme::{Theme, space, type_size},
-    widgets::{card_ui, scrolled_ui, state_ui},
+    glossary,
+    job::{Background, Wake},
+    shared::{
+        Command, Effect, FileInUse, FileTask, FileWords, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Tone,
+        View,
+    },
+    theme::space,
+    widgets::{ghost_button, primary_button},
 };
-use decoupler_core::{live::FaultEvent, text::counted};
-use decoupler_files::live::{SourcePlan, Watched};
+
+/// The Live view.
+#[derive(Debug)]
+pub struct LiveView {
+    /// The latest state of the session, which stays on the screen after its end.
+    pub shown: Snapshot,
+    /// Decoding under way. Its thread ends once this is dropped.
+    pub running: Option<Running>,
+    /// The network that decodes; `None` for the newest run.
+    pub(super) picked: Option<Picked>,
+    pub(super) source: SourceForm,
+    /// The node under the pointer, marked on all surfaces.
+    pub(super) node: Option<usize>,
+    /// Path of the file that the user is asked for.
+    pub(super) chosen: Option<(FileWords, Receiver<PathBuf>)>,
+    /// The stream that has ended by itself.
+    ended: Option<SourcePlan>,
+    /// True if the window has received a snapshot and not yet reported to the thread that it was drawn.
+    is_to_be_drawn: bool,
+    /// Reads a network, and the path of the recording that it shall decode.
+    loading: Background<Result<(Picked, Option<PathBuf>), String>>,
+    job: Background<LiveEvent>,
+}
+
+/// Decoding under way.
+#[derive(Debug)]
+pub struct Running {
+    /// Name of the network.
+    pub network: String,
+    /// Source of the frames.
+    pub source: SourcePlan,
+    requests: Sender<Request>,
+}
+
+impl Running {
+    /// Returns the source in a few words.
+    pub fn source_text(&self) -> String {
+        match &self.source {
+            SourcePlan::Simulated(_) => "the simulated source".to_owned(),
+            SourcePlan::Replay(path) => format!("'{}'", path.file_name().unwrap_or_default().display()),
+            SourcePlan::Stream(source) => source.to_string(),
+        }
+    }
+}
+
+impl LiveView {
+    /// Creates the view without frames; `wake` is called when there are events.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            shown: Snapshot::default(),
+            running: None,
+            picked: None,
+            source: SourceForm::default(),
+            node: None,
+            chosen: None,
+            ended: None,
+            is_to_be_drawn: false,
+            loading: Background::prompt("network file", Arc::clone(&wake)),
+            job: Background::prompt("live", wake),
+        }
+    }
+
+    /// Returns the network that decodes, and its name; `None` if there is none.
+    pub(super) fn network<'a>(&'a self, shared: &'a Shared) -> Option<(&'a str, &'a Arc<NetworkFile>)> {
+        let picked = self.picked.as_ref().map(|picked| (&*picked.name, &picked.file));
+        picked.or_else(|| shared.runs.newest().map(|run| (run.name, run.file)))
+    }
+
+    /// Decodes with the run of this number once it is read, or with the newest.
+    pub(super) fn pick(&mut self, run: Option<u64>, shared: &Shared) {
+        let Some(run) = run.and_then(|id| shared.runs.run(id)).cloned() else {
+            self.picked = None;
+            return self.restart(shared);
+        };
+        let folder = shared.runs.path.clone().unwrap_or_default();
+        self.load(move || {
+            let file = run.load(&folder).map_err(|error| error.to_string())?;
+            let (run, name) = (Some(run.id), run.name);
+            Ok((Picked { run, name, file }, None))
+        });
+    }
+
+    /// Returns the name of the chosen network, and the plan for the current settings.
+    ///
+    /// # Errors
+    /// If there is no network or a setting is missing, with what to do.
+    pub(super) fn plan(&self, shared: &Shared) -> Result<(String, SessionPlan), String> {
+        let network = self.network(shared);
+        let (name, network) = network.ok_or("Train a network, or open a network file.")?;
+        let simulation = network.problem.sensor.as_ref();
+        let noise = simulation.map(|simulation| Noise {
+            relative: self.source.noise(simulation),
+            ..simulation.scene.noise.in_test()
+        });
+        let plan = SessionPlan {
+            network: Arc::clone(network),
+            source: self.source.plan(simulation.is_some())?,
+            noise: noise.unwrap_or_default(),
+            zero: self.shown.zero.clone(),
+            unit: Unit::Frames,
+        };
+        Ok((name.to_owned(), plan))
+    }
+
+    /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
+    pub(super) fn has_sensor(&self, shared: &Shared) -> bool {
+        let network = self.network(shared);
+        network.is_none_or(|(_, file)| file.problem.sensor.is_some())
+    }
+
+    /// Returns true while frames are recorded.
+    pub(super) fn is_recording(&self) -> bool {
+        self.running.is_some() && self.shown.is_recording
+    }
+
+    /// Begins to decode.
+    pub fn start(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        effects.push(Effect::Settle(Matter::Live));
+        self.begin(shared, None);
+    }
+
+    /// Restarts with the network that is chosen now if a source is running, from the current position of a replay.
+    pub(super) fn restart(&mut self, shared: &Shared) {
+        if self.running.is_some() {
+            self.begin(shared, self.shown.replay);
+        }
+    }
+
+    fn begin(&mut self, shared: &Shared, replay: Option<ReplayState>) {
+        let Ok((network, plan)) = self.plan(shared) else { return };
+        let before = std::mem::take(&mut self.shown);
+        self.shown = Snapshot {
+            // A replay continues without a gap on the screen.
+            answer: before.answer.filter(|_| replay.is_some()),
+            recorded: before.recorded,
+            zero: before.zero,
+            replay,
+            ..Snapshot::default()
+        };
+        (self.node, self.ended, self.is_to_be_drawn) = (None, None, false);
+        let (requests, incoming) = channel();
+        self.running = Some(Running {
+            network,
+            source: plan.source.clone(),
+            requests,
+        });
+        self.steer();
+        if let Some(replay) = replay {
+            self.control(move |control, now| {
+                control.seek(replay.at_s, now);
+                control.play(replay.is_playing, now);
+            });
+        }
+        let shown = self.shown.clone();
+        self.job.start(
+            move |report| run(plan, shown, &incoming, report),
+            |ended| LiveEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
+        );
+    }
+
+    fn ask(&self, request: Request) {
+        if let Some(running) = &self.running {
+            // A thread that has just ended ignores requests.
+            let _ = running.requests.send(request);
+        }
+    }
+
+    /// Changes the session on its thread, if it is running; the reason of a failure is shown.
+    pub(super) fn change(&self, change: impl FnOnce(&mut Session) -> Result<(), String> + Send + 'static) {
+        self.ask(Request::Change(Box::new(change)));
+    }
+
+    /// Changes the replay, if there is one.
+    pub(super) fn control(&self, change: impl FnOnce(&mut Replay, Instant) + Send + 'static) {
+        self.change(|session| {
+            if let Input::Replay(replay) = &mut session.input {
+                change(replay, Instant::now());
+            }
+            Ok(())
+        });
+    }
+
+    /// Applies the motion of the indenter and the speed of the replay to the source.
+    pub(super) fn steer(&self) {
+        let (motion, speed) = (self.source.motion, self.source.speed);
+        self.change(move |session| {
+            match &mut session.input {
+                Input::Simulated(simulated, _) => simulated.motion = motion,
+                Input::Replay(replay) => replay.set_speed(speed, Instant::now()),
+                Input::Lines(_) => {}
+            }
+            Ok(())
+        });
+    }
+
+    /// Takes the latest frames as the unloaded state.
+    pub(super) fn re_zero(&self) {
+        self.change(|session| {
+            let taken = session.array.as_mut().map(LiveArray::take_zero).transpose();
+            taken.map(drop).map_err(|error| format!("Not re-zeroed: {error}."))
+        });
+    }
+
+    /// Stops dividing readings by gains.
+    pub(super) fn clear_zero(&mut self) {
+        self.shown.zero = None;
+        self.change(|session| {
+            session.array.iter_mut().for_each(|array| array.zero = None);
+            Ok(())
+        });
+    }
+
+    /// Begins a recording, or ends it.
+    pub(super) fn record(&self, shared: &Shared) {
+        let (folder, begins) = (folder(shared).join("recordings"), !self.is_recording());
+        self.change(move |session| {
+            let array = session.array.as_ref().filter(|_| begins);
+            let file = array.map(|array| RecordingFile::create(&folder, &array.rows, array.sensor.scale.columns()));
+            session.recording = file.transpose()?;
+            Ok(())
+        });
+    }
+
+    /// Plays a file.
+    pub(super) fn replay(&mut self, path: &Path, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.source.kind = SourceKind::Replay;
+        self.source.path = path.display().to_string();
+        self.start(shared, effects);
+    }
+
+    /// Returns true if a stream has ended by itself and is still the chosen source.
+    pub fn can_retry(&self, shared: &Shared) -> bool {
+        let is_same = |ended: &SourcePlan| self.plan(shared).is_ok_and(|(_, plan)| plan.source == *ended);
+        self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
+    }
+
+    /// Reads a network in the background.
+    pub(super) fn load(&mut self, read: impl FnOnce() -> Result<(Picked, Option<PathBuf>), String> + Send + 'static) {
+        self.loading.start(
+            move |_| read(),
+            |read| read.unwrap_or_else(|error| Err(error.to_string())),
+        );
+    }
+
+    /// Writes the sample recording and its network to files, to be played as soon as they are ready.
+    pub(super) fn play_sample(&mut self, shared: &Shared) {
+        let folder = folder(shared).join("samples");
+        self.load(move || write_sample(&folder));
+    }
+
+    /// Takes the file that the user has chosen.
+    fn take_chosen(&mut self) {
+        let Some((words, Ok(path))) = self.chosen.as_ref().map(|(words, paths)| (*words, paths.try_recv())) else {
+            return;
+        };
+        self.chosen = None;
+        if words != NETWORK {
+            self.source.path = path.display().to_string();
+            return;
+        }
+        self.load(move || {
+            let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+            let (run, name, file) = (None, name.into_owned(), Arc::new(file));
+            Ok((Picked { run, name, file }, None))
+        });
+    }
+
+    /// Returns the state of the stream, its network and source, and its rate.
+    fn status(&self) -> Status {
+        let (counts, replay) = (&self.shown.counts, &self.shown.replay);
+        let Some(running) = &self.running else {
+            return match counts.decoded {
+                0 => Status::new(Tone::Calm, "Ready: press Start"),
+                decoded => Status::new(Tone::Calm, format!("Stopped after {}", counted(decoded, "frame"))),
+            };
+        };
+        let fault = self.shown.answer.as_ref().map(|answer| &answer.fault);
+        let mut status = match (fault, replay) {
+            (None, _) => Status::new(Tone::Busy, "Waiting for the first frame"),
+            _ if counts.is_waiting => Status::new(Tone::Warning, "No frame for two seconds"),
+            (Some(Some((fault, _))), _) => Status::new(Tone::Warning, format!("Fault: {fault}")),
+            (_, Some(replay)) if !replay.is_playing => Status::new(Tone::Calm, "Replay paused"),
+            (_, Some(_)) => Status::new(Tone::Good, "Replaying"),
+            (_, None) => Status::new(Tone::Good, "Live"),
+        };
+        status = status.with_note(format!("{}, {}", running.network, running.source_text()));
+        if counts.decoded > 0 {
+            status = status.with_note(format!("{:.0} frames per second", counts.frames_per_second));
+        }
+        if let Some(recorded) = self.shown.recorded.as_ref().filter(|_| self.is_recording()) {
+            let (frames, seconds) = (counted(recorded.frames, "frame"), recorded.seconds);
+            status = status.with_note(format!("● Recording: {frames}, {seconds:.1} s"));
+        }
+        status
+    }
+}
 
 impl View for LiveView {
-    fn name(&self) -> &'static str {
-        "Live"
-    }
-
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        self.follow(effects);
-        if self.network.take_events() && self.running.is_some() {
-            self.restart(shared);
+        let notify = |notice| Effect::Notify(Matter::Live, notice);
+        while let Some(event) = self.job.next_event() {
+            match event {
+                LiveEvent::Shown(shown) => (self.shown, self.is_to_be_drawn) = (*shown, true),
+                LiveEvent::Failed(reason) => effects.push(notify(Notice::Failed(reason))),
+                LiveEvent::Ended(end) => {
+                    let Some(running) = self.running.take() else { continue };
+                    let is_stream = self.shown.replay.is_none() && !matches!(running.source, SourcePlan::Simulated(_));
+                    self.ended = is_stream.then_some(running.source);
+                    effects.push(notify(match end {
+                        Err(reason) => Notice::Failed(reason),
+                        Ok(()) => Notice::Done("The source has ended.".to_owned()),
+                    }));
+                }
+            }
         }
-        self.source.take_events();
-        self.take_sample(shared, effects);
+        self.take_chosen();
+        match self.loading.next_event() {
+            Some(Ok((picked, recording))) => {
+                self.picked = Some(picked);
+                match recording {
+                    Some(recording) => self.replay(&recording, shared, effects),
+                    None => self.restart(shared),
+                }
+            }
+            Some(Err(reason)) => effects.push(notify(Notice::Failed(reason))),
+            None => {}
+        }
     }
 
-    fn is_working(&self) -> bool {
-        self.running.is_some()
-    }
-
-    fn files_in_use(&self) -> Vec<FileInUse> {
+    fn holdings(&self, _shared: &Shared) -> Holdings {
         let replayed = self.running.as_ref().and_then(|running| match &running.source {
             SourcePlan::Replay(path) => Some(FileInUse::Recording(path.clone())),
             _ => None,
         });
-        let recorded = self.recording.clone().map(FileInUse::Recorded);
-        replayed.into_iter().chain(recorded).collect()
+        let recorded = self.shown.recorded.as_ref().filter(|_| self.is_recording());
+        let recorded = recorded.map(|recorded| FileInUse::Recorded(recorded.path.clone()));
+        Holdings {
+            is_computing: self.running.is_some(),
+            files: replayed.into_iter().chain(recorded).collect(),
+            ..Holdings::default()
+        }
     }
 
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-        tools::offer_actions(self, offers, shared, effects);
+    fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        for command in COMMANDS {
+            if offers.offer(command.clone(), obstacle(&command, self, shared).is_none()) {
+                carry_out(&command, self, shared, effects);
+            }
+        }
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        tools::tools_ui(ui, self, shared, effects);
+        let count = if self.has_sensor(shared) { 4 } else { 2 };
+        for command in &COMMANDS[..count] {
+            command_ui(ui, command, self, shared, effects);
+        }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        live_exports(self, shared)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        let answer = self.shown.answer.as_deref();
+        let answer = answer.ok_or_else(|| "There is no frame yet: start a source.".to_owned());
+        let surface = answer.clone();
+        let surface = surface.map(|answer| || surface_figure(answer, None, shared.look).into());
+        let surface = Shown::figure("Surface", "live-surface".to_owned(), surface);
+        if let Ok(answer) = &answer
+            && let Some(chart) = &answer.chart
+        {
+            let (chart, values) = (Ok(|| chart.clone().into()), Ok(|| values_table(answer)));
+            let chart = Shown::figure("Decoded values", "live-values".to_owned(), chart);
+            let values = Shown::table("Decoded values", "live-values".to_owned(), values);
+            let surface = (!answer.surfaces.is_empty()).then_some(surface);
+            return [chart].into_iter().chain(surface).chain([values]).collect();
+        }
+        let readings = answer.and_then(|answer| answer.readings.as_ref().ok_or_else(String::new));
+        let readings = readings.map(|readings| || readings.clone().coloured(shared.look.colours).into());
+        let recorded = self.shown.recorded.as_ref().map(save_recording);
+        let recorded = recorded.ok_or_else(|| "Nothing is recorded: press Record while a source runs.".to_owned());
+        vec![
+            surface,
+            Shown::figure("Readings", "live-readings".to_owned(), readings),
+            Shown::file("Recording", recorded),
+        ]
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        source_form::form_ui(ui, self, shared, effects);
+        form_ui(ui, self, shared, effects);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        live_ui(ui, self, shared, effects);
-        self.report_drawn();
-    }
-
-    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        status_ui(ui, self);
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
+        cards::body_ui(ui, self, shared, effects);
+        // The thread may send the next snapshot.
+        if std::mem::take(&mut self.is_to_be_drawn) {
+            self.ask(Request::Drawn);
+        }
+        Some(self.status())
     }
 }
 
-/// Shows the surfaces above, readings and figures below, and the replay bar at the bottom.
-fn live_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let whole = ui.available_rect_before_wrap();
-    if !view.shown.has_answer() {
-        card_ui(ui, whole, |ui| invitation_ui(ui, view, shared, effects));
-        ui.allocate_rect(whole, Sense::hover());
-        return;
+/// Commands on a source, from right to left.
+const COMMANDS: [Command; 5] = [
+    Command::Cancel("Stop live decoding"),
+    Command::Begin("Start live decoding"),
+    Command::Record,
+    Command::ReZero,
+    Command::PlayReplay,
+];
+
+/// Returns the text of the button of a command.
+fn button(command: &Command, view: &LiveView) -> &'static str {
+    match command {
+        Command::Cancel(_) => "■ Stop",
+        Command::Begin(_) => "▶ Start",
+        Command::Record if view.is_recording() => "■ End recording",
+        Command::Record => "● Record",
+        Command::ReZero => "Re-zero",
+        _ if view.shown.replay.is_some_and(|replay| replay.is_playing) => "⏸ Pause",
+        _ => "▶ Play",
     }
-    let gap = space(2);
-    let mut cards = whole;
-    if view.shown.replay.is_some() {
-        let (rest, bar) = whole.split_top_bottom_at_y(whole.bottom() - REPLAY_BAR_HEIGHT);
-        card_ui(ui, bar, |ui| replay_bar_ui(ui, view));
-        cards = rest.with_max_y(rest.bottom() - gap);
-    }
-    if view.shown.targets.is_some() {
-        targets_ui(ui, cards, view, shared, effects);
-        ui.allocate_rect(whole, Sense::hover());
-        return;
-    }
-    let lower_height = (0.46 * cards.height()).clamp(space(60), space(100));
-    let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
-    surfaces_ui(ui, upper.with_max_y(upper.bottom() - gap), view, shared, effects);
-    let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
-    let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-    card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
-        readings_ui(ui, view, shared.look.colours);
-    });
-    card_ui(ui, right, |ui| {
-        scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, shared, effects));
-    });
-    ui.allocate_rect(whole, Sense::hover());
 }
 
-/// Shows the state of the stream in the line at the bottom.
-fn status_ui(ui: &mut Ui, view: &LiveView) {
-    let palette = Theme::of(ui).palette;
-    let counts = &view.shown.counts;
-    let watched = view.shown.frame.as_ref().map(|frame| &frame.watched);
-    let (colour, text) = match (&view.running, watched) {
-        (None, _) if counts.decoded > 0 => (
-            palette.dim,
-            format!("Stopped after {}", counted(counts.decoded, "frame")),
-        ),
-        (None, _) => (palette.dim, "Ready: press Start".to_owned()),
-        (Some(_), _) if !view.shown.has_answer() => (palette.accent, "Waiting for the first frame".to_owned()),
-        (Some(_), _) if counts.is_waiting => (palette.warning, "No frame for two seconds".to_owned()),
-        (Some(_), Some(Watched::Checked(FaultEvent::Named { wire, .. }))) => {
-            (palette.warning, format!("Fault: {wire}"))
-        }
-        (Some(_), Some(Watched::Checked(FaultEvent::Unexplained))) => {
-            (palette.warning, "The readings contradict Eq. (2)".to_owned())
-        }
-        (Some(running), _) => match (&running.source, view.shown.replay) {
-            (SourcePlan::Replay(_), Some(replay)) if !replay.is_playing => (palette.dim, "Replay paused".to_owned()),
-            (SourcePlan::Replay(_), _) => (palette.good, "Replaying".to_owned()),
-            _ => (palette.good, "Live".to_owned()),
-        },
+/// Returns the reason why a command is not available now, if there is one.
+fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<String> {
+    let (is_running, is_replay) = (view.running.is_some(), view.shown.replay.is_some());
+    let reason = match command {
+        Command::Begin(_) if is_running => "Frames are being decoded.",
+        Command::Begin(_) => return view.plan(shared).err(),
+        _ if !is_running => "Start a source first.",
+        Command::PlayReplay if !is_replay => "There is no replay.",
+        Command::Record | Command::ReZero if !view.has_sensor(shared) => "This needs the sensor model of an array.",
+        Command::Record if is_replay => "A replay cannot be recorded.",
+        _ => return None,
     };
-    ui.horizontal_centered(|ui| {
-        state_ui(ui, colour, &text);
-        let dim = |ui: &mut Ui, text: String| ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
-        if let Some(running) = &view.running {
-            let source = match &running.source {
-                SourcePlan::Simulated(_) => "simulated".to_owned(),
-                SourcePlan::Replay(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-                SourcePlan::Stream(source) => source.to_string(),
-            };
-            dim(ui, format!("{}, {source}", running.network));
-            if counts.decoded > 0 {
-                dim(ui, format!("{:.0} frames per second", counts.frames_per_second));
-            }
+    Some(reason.to_owned())
+}
+
+fn carry_out(command: &Command, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    match command {
+        // The thread ends once the sender of its requests is dropped; the last frame stays on the screen.
+        Command::Cancel(_) => view.running = None,
+        Command::Begin(_) => view.start(shared, effects),
+        Command::Record => view.record(shared),
+        Command::ReZero => view.re_zero(),
+        _ => {
+            let plays = view.shown.replay.is_some_and(|replay| !replay.is_playing);
+            view.control(move |control, now| control.play(plays, now));
         }
-        if let Some(recorded) = view.shown.recording.as_ref().filter(|_| view.recording.is_some()) {
-            let frames = counted(recorded.frames, "frame");
-            let text = format!("● Recording: {frames}, {:.1} s", recorded.seconds);
-            ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
-        }
+    }
+}
+
+/// Shows the button of a command.
+pub(super) fn command_ui(
+    ui: &mut Ui,
+    command: &Command,
+    view: &mut LiveView,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
+    let (about, obstacle, text) = (command.about(), obstacle(command, view, shared), button(command, view));
+    let hint = match about.keys {
+        Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
+        None => glossary::UNLOADED_STATE.hint.to_owned(),
+    };
+    let button = ui.add_enabled_ui(obstacle.is_none(), |ui| match command {
+        Command::Begin(_) => primary_button(text).ui(ui),
+        Command::PlayReplay => ui.add(ghost_button(text).min_size([space(18), space(6)].into())),
+        Command::Record => ui.add(ghost_button(text).selected(view.is_recording())),
+        _ => ui.add(ghost_button(text)),
     });
+    let button = button.inner.on_hover_text(hint);
+    if button.on_disabled_hover_text(obstacle.unwrap_or_default()).clicked() {
+        carry_out(command, view, shared, effects);
+    }
+}
+
+fn values_table(answer: &Answered) -> Table {
+    let names = answer.network.problem.targets.iter().map(Channel::title);
+    let columns = std::iter::once("time_s".to_owned()).chain(names);
+    let row = |(time_s, values): &(f64, Arc<[f64]>)| {
+        let values = std::iter::once(time_s).chain(values.iter());
+        values.map(|&value| Cell::from(value)).collect()
+    };
+    Table {
+        columns: columns.map(TableColumn::field).collect(),
+        rows: answer.history.all().iter().map(row).collect(),
+    }
+}
+
+/// Saves a copy of a recording.
+fn save_recording(recorded: &Recorded) -> FileTask {
+    let words = FileWords {
+        kind: "recording",
+        description: "Every frame with its time, as CSV: a line for each row-wire. It can be replayed here, and the terminal \
+                      command decode reads it.",
+        extensions: &["csv"],
+    };
+    let from = recorded.path.clone();
+    FileTask::save(words, "recording", move |path| match is_same(path, &from) {
+        true => Ok(()),
+        false => atomic_write(path, |file| io::copy(&mut File::open(&from)?, file).map(drop)),
+    })
+}
+
+/// Returns the folder for files of this view: next to the runs, or a temporary one.
+fn folder(shared: &Shared) -> PathBuf {
+    let parent = shared.runs.path.as_ref().and_then(|runs| runs.parent());
+    parent.map_or_else(std::env::temp_dir, PathBuf::from)
+}
+
+/// Writes the sample recording to a file, and returns the network that decodes it.
+fn write_sample(folder: &Path) -> Result<(Picked, Option<PathBuf>), String> {
+    let failed = |error: &dyn std::fmt::Display| format!("the sample cannot be written: {error}");
+    let text = include_str!("../../../../assets/samples/network.json");
+    let file = NetworkFile::from_text(text).map_err(|error| error.to_string())?;
+    let text = include_str!("../../../../assets/samples/recording.csv");
+    let path = folder.join("sample recording.csv");
+    fs::create_dir_all(folder).map_err(|error| failed(&error))?;
+    atomic_write(&path, |writer| writer.write_all(text.as_bytes())).map_err(|error| failed(&error))?;
+    let (run, name, file) = (None, "sample network.json".to_owned(), Arc::new(file));
+    Ok((Picked { run, name, file }, Some(path)))
 }

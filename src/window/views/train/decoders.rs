@@ -3,7 +3,7 @@
 //!
 //! The thread ends after the last decoder, or after the current one if it is cancelled.
 
-use std::{cell::RefCell, path::Path, sync::Arc};
+use std::{cell::Cell, path::Path, sync::Arc};
 
 use decoupler_core::{
     dataset::Dataset,
@@ -17,12 +17,12 @@ use decoupler_files::{
     export::{format_number, format_r2},
     import::Setup,
 };
-use eframe::egui::{Button, CollapsingHeader, Ui, Vec2};
+use eframe::egui::{Button, CollapsingHeader, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
     glossary,
     job::{Background, JobError, Report, Wake},
-    shared::{DecoderSource, FileTask, Phase, Shared, decoder_export_ui, target_choice_ui},
+    shared::{Exporting, NetworkSource, Phase, Shared, target_choice_ui},
     theme::{Theme, space},
     training_worker::RunId,
     widgets::{ColumnWidth, TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
@@ -36,108 +36,16 @@ enum MeasuringEvent {
     Ended(Result<(), JobError>),
 }
 
-/// The window's end of the thread.
+/// The table of decoders, and the window's end of the thread.
 #[derive(Debug)]
-pub struct DecoderMeasuring {
-    job: Background<MeasuringEvent>,
-    /// The training whose networks are measured, and its number of epochs at that time.
-    of: Option<(RunId, usize)>,
-    /// True after an internal error: the decoders are measured again once the table is closed and opened.
-    has_failed: bool,
-}
-
-impl DecoderMeasuring {
-    /// Nothing measured yet. `wake` is called after each decoder and at the end.
-    pub fn new(wake: Wake) -> Self {
-        Self {
-            job: Background::new("decoders", wake),
-            of: None,
-            has_failed: false,
-        }
-    }
-
-    /// Takes events, discards results of networks that have changed since, and measures the displayed networks once the
-    /// training is paused and the table is unfolded.
-    pub fn follow(&mut self, shared: &Shared, state: &mut DecodersState) {
-        self.take_events(state);
-        let standing = shared.run.as_ref().and_then(|run| {
-            let result = run.result.as_ref()?;
-            result
-                .is_idle
-                .then_some((run, (run.id, result.epochs_run), &result.networks))
-        });
-        let is_other = standing.is_some_and(|(_, of, _)| self.of.is_some_and(|measured| measured != of));
-        let is_closed = self.has_failed && !state.is_open;
-        if is_other || is_closed || shared.phase == Phase::Training {
-            self.forget(state);
-        }
-        let is_wanted = state.is_open && state.measured.is_none();
-        if let (true, Phase::Paused | Phase::Ended(_), Some((run, of, networks))) = (is_wanted, shared.phase, standing)
-        {
-            self.of = Some(of);
-            state.measured = Some(DecoderResult::pending(&run.problem));
-            let (problem, test) = (Arc::clone(&run.problem), Arc::clone(run.test.set()));
-            self.begin(run.setup.clone(), problem, (**networks).clone(), test);
-        }
-    }
-
-    fn forget(&mut self, state: &mut DecodersState) {
-        self.job.abandon();
-        (self.of, state.measured, self.has_failed) = (None, None, false);
-    }
-
-    /// Measures all decoders of `setup` with their trained `networks` on `test`, which `problem` describes.
-    fn begin(&mut self, setup: Setup, problem: Arc<Problem>, networks: Networks, test: Arc<Dataset>) {
-        self.job.start(
-            move |report| measure_all(&setup, &problem, networks, &test, report),
-            MeasuringEvent::Ended,
-        );
-    }
-
-    /// Takes the events of the thread.
-    fn take_events(&mut self, state: &mut DecodersState) {
-        while let Some(event) = self.job.next_event() {
-            match event {
-                MeasuringEvent::Measured(place, report) => state.take(place, report),
-                MeasuringEvent::Ended(Ok(())) => {}
-                MeasuringEvent::Ended(Err(error)) => {
-                    self.has_failed = true;
-                    state.end(&format!("{error}; close the table and open it again"));
-                }
-            }
-        }
-    }
-}
-
-fn measure_all(setup: &Setup, problem: &Problem, networks: Networks, test: &Dataset, report: &Report<MeasuringEvent>) {
-    let is_cancelled = || report.is_cancelled();
-    let sets = setup.sets(Path::new(""), &Job::new(&is_cancelled), &mut |_| ());
-    let set = sets.map_err(|error| error.to_string()).map(|sets| {
-        let training = sets.sets.split.training;
-        DecoderSet::new(*setup.settings(), training, Some(networks))
-    });
-    for (place, wanted) in DecoderResult::pending(problem).into_iter().enumerate() {
-        if is_cancelled() {
-            return;
-        }
-        let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, test) {
-            Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
-            Err(error) => Err(error.to_string()),
-        };
-        report.send(MeasuringEvent::Measured(
-            place,
-            set.as_ref().map_err(String::clone).and_then(measure),
-        ));
-    }
-}
-
-/// The table of decoders.
-#[derive(Debug, Default)]
-pub struct DecodersState {
+pub struct Decoders {
     /// True while the table is unfolded.
     pub is_open: bool,
     /// Results for the current training; none while it is running.
     pub measured: Option<Vec<DecoderResult>>,
+    /// The training whose networks are measured, and its number of epochs at that time.
+    of: Option<(RunId, usize)>,
+    job: Background<MeasuringEvent>,
 }
 
 /// Result of a decoder.
@@ -163,121 +71,168 @@ impl DecoderResult {
     }
 }
 
-impl DecodersState {
+impl Decoders {
+    /// Nothing measured yet. `wake` is called after each decoder and at the end.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            is_open: false,
+            measured: None,
+            of: None,
+            job: Background::new("decoders", wake),
+        }
+    }
+
     /// Returns true while a result is missing.
     pub fn is_measuring(&self) -> bool {
-        let results = self.measured.iter().flatten();
-        results.into_iter().any(|result| result.report.is_none())
+        let mut results = self.measured.iter().flatten();
+        results.any(|result| result.report.is_none())
     }
 
-    /// Takes events about one decoder.
-    pub fn take(&mut self, place: usize, report: Result<DecoderReport, String>) {
-        if let Some(result) = self.measured.as_mut().and_then(|measured| measured.get_mut(place)) {
-            result.report = Some(report);
+    /// Takes events, discards results of networks that have changed since, and measures the displayed networks once the
+    /// training is paused and the table is unfolded. What failed is tried again once the table is closed and opened.
+    pub fn follow(&mut self, shared: &Shared) {
+        self.take_events();
+        let run = shared.run.as_ref();
+        let standing = run.and_then(|run| Some((run, run.result.as_ref().filter(|result| result.is_idle)?)));
+        let of = standing.map(|(run, result)| (run.id, result.epochs_run));
+        let is_other = of.is_some() && self.of.is_some() && of != self.of;
+        let mut results = self.measured.iter().flatten();
+        let has_failed = results.any(|result| matches!(result.report, Some(Err(_))));
+        if is_other || (has_failed && !self.is_open) || shared.phase == Phase::Training {
+            self.forget();
+        }
+        let is_wanted = self.is_open && self.measured.is_none();
+        if let (true, Phase::Paused | Phase::Ended(_), Some((run, result))) = (is_wanted, shared.phase, standing) {
+            self.of = of;
+            let (problem, test) = (Arc::clone(&run.problem), Arc::clone(run.test.set()));
+            self.begin(run.setup.clone(), problem, (*result.networks).clone(), test);
         }
     }
 
-    /// Marks the missing results as failed for this reason.
-    pub fn end(&mut self, reason: &str) {
-        let results = self.measured.iter_mut().flatten();
-        for result in results.filter(|result| result.report.is_none()) {
-            result.report = Some(Err(reason.to_owned()));
+    fn forget(&mut self) {
+        self.job.abandon();
+        (self.of, self.measured) = (None, None);
+    }
+
+    /// Measures all decoders of `setup` with their trained `networks` on `test`, which `problem` describes.
+    fn begin(&mut self, setup: Setup, problem: Arc<Problem>, networks: Networks, test: Arc<Dataset>) {
+        self.measured = Some(DecoderResult::pending(&problem));
+        self.job.start(
+            move |report| measure_all(&setup, &problem, networks, &test, report),
+            MeasuringEvent::Ended,
+        );
+    }
+
+    fn take_events(&mut self) {
+        while let Some(event) = self.job.next_event() {
+            let mut results = self.measured.iter_mut().flatten();
+            match event {
+                MeasuringEvent::Measured(place, report) => {
+                    if let Some(result) = results.nth(place) {
+                        result.report = Some(report);
+                    }
+                }
+                MeasuringEvent::Ended(Ok(())) => {}
+                MeasuringEvent::Ended(Err(error)) => {
+                    let reason = format!("{error}; close the table and open it again");
+                    for result in results.filter(|result| result.report.is_none()) {
+                        result.report = Some(Err(reason.clone()));
+                    }
+                }
+            }
         }
     }
 }
 
-/// Figure measured for a decoder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Figure {
-    ZPercent,
-    TimesModelBased,
-    Residual,
-    RangePercent,
-    Rmse,
-    R2,
-    FrameTime,
-}
-
-impl Figure {
-    /// Returns the figures for this problem, from left to right.
-    fn of(problem: &Problem, has_model_based: bool) -> Vec<Self> {
-        if !problem.has_nodes() {
-            return vec![Self::RangePercent, Self::Rmse, Self::R2, Self::FrameTime];
+fn measure_all(setup: &Setup, problem: &Problem, networks: Networks, test: &Dataset, report: &Report<MeasuringEvent>) {
+    let is_cancelled = || report.is_cancelled();
+    let sets = setup.sets(Path::new(""), &Job::new(&is_cancelled), &mut |_| ());
+    let set = sets.map_err(|error| error.to_string()).map(|sets| {
+        let training = sets.sets.split.training;
+        DecoderSet::new(*setup.settings(), training, Some(networks))
+    });
+    for (place, wanted) in DecoderResult::pending(problem).into_iter().enumerate() {
+        if is_cancelled() {
+            return;
         }
-        let figures = [Self::ZPercent, Self::TimesModelBased, Self::Residual, Self::FrameTime].into_iter();
-        figures
-            .filter(|figure| has_model_based || *figure != Self::TimesModelBased)
-            .collect()
-    }
-
-    fn column(self) -> TableColumn<'static> {
-        let (heading, meaning) = match self {
-            Self::ZPercent => ("Z %", glossary::Z_PERCENT.hint),
-            Self::TimesModelBased => (
-                "× model-based",
-                "Mean |error| of z divided by that of the model-based decoder in this scene.",
-            ),
-            Self::Residual => ("residual", glossary::RESIDUAL.hint),
-            Self::RangePercent => (
-                "% of range",
-                "Mean absolute error in percent of the range, averaged over all targets that vary.",
-            ),
-            Self::Rmse => ("RMSE", ErrorMeasure::Rmse.definition()),
-            Self::R2 => ("R²", ErrorMeasure::R2.definition()),
-            Self::FrameTime => (
-                "µs",
-                "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
-            ),
+        let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, test) {
+            Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
+            Err(error) => Err(error.to_string()),
         };
-        TableColumn::figure(heading).meaning(meaning)
-    }
-
-    fn value(self, report: &DecoderReport, model_based: Option<&Errors>, target: usize) -> Option<f64> {
-        let of_target = report.errors.targets().get(target);
-        match self {
-            Self::ZPercent | Self::RangePercent => report.errors.percent(),
-            Self::TimesModelBased => report.errors.nodes()?.times(model_based?),
-            Self::Residual => report.residual,
-            Self::Rmse => Some(of_target?.rmse),
-            Self::R2 => of_target?.r2,
-            Self::FrameTime => Some(report.frame_us),
-        }
-    }
-
-    /// Returns the same figure of the model-based errors.
-    fn of_model_based(self, errors: &Errors) -> Option<f64> {
-        match self {
-            Self::ZPercent => errors.z_percent,
-            Self::TimesModelBased => Some(1.0),
-            _ => None,
-        }
+        let measured = set.as_ref().map_err(String::clone).and_then(measure);
+        report.send(MeasuringEvent::Measured(place, measured));
     }
 }
+
+/// A column of the table: its heading and meaning, and the figure of a decoder next to the model-based errors and for the
+/// displayed target.
+#[derive(Clone, Copy)]
+struct Figure {
+    heading: &'static str,
+    meaning: fn() -> &'static str,
+    value: fn(&DecoderReport, Option<&Errors>, usize) -> Option<f64>,
+}
+
+const PERCENT: Figure = Figure {
+    heading: "Z %",
+    meaning: || glossary::Z_PERCENT.hint,
+    value: |report, _, _| report.errors.percent(),
+};
+
+const TIMES: Figure = Figure {
+    heading: "× model-based",
+    meaning: || "Mean |error| of z divided by that of the model-based decoder in this scene.",
+    value: |report, model_based, _| report.errors.nodes()?.times(model_based?),
+};
+
+const RESIDUAL: Figure = Figure {
+    heading: "residual",
+    meaning: || glossary::RESIDUAL.hint,
+    value: |report, _, _| report.residual,
+};
+
+const RANGE_PERCENT: Figure = Figure {
+    heading: "% of range",
+    meaning: || "Mean absolute error in percent of the range, averaged over all targets that vary.",
+    ..PERCENT
+};
+
+const RMSE: Figure = Figure {
+    heading: "RMSE",
+    meaning: || ErrorMeasure::Rmse.definition(),
+    value: |report, _, target| Some(report.errors.targets().get(target)?.rmse),
+};
+
+const R2: Figure = Figure {
+    heading: "R²",
+    meaning: || ErrorMeasure::R2.definition(),
+    value: |report, _, target| report.errors.targets().get(target)?.r2,
+};
+
+const FRAME_TIME: Figure = Figure {
+    heading: "µs",
+    meaning: || "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
+    value: |report, _, _| Some(report.frame_us),
+};
 
 /// The other decoders on the same test set, folded away until the user asks for them, next to the `model_based`
 /// errors. `target` is the target whose errors are shown for a recording. Each decoder can be exported with
-/// `source`; returns the requested file.
+/// `source`; returns the requested export.
 pub fn decoders_ui(
     ui: &mut Ui,
-    decoders: &mut DecodersState,
-    phase: Phase,
+    decoders: &mut Decoders,
     (problem, model_based): (&Problem, Option<&Errors>),
     target: &mut usize,
-    source: Option<&DecoderSource>,
-) -> Option<FileTask> {
+    source: Option<&NetworkSource>,
+) -> Option<Exporting> {
     let mut asked = None;
     ui.add_space(space(1));
     let header = CollapsingHeader::new("More decoders")
         .open(Some(decoders.is_open))
-        .show(ui, |ui| {
-            if let Some(measured) = &decoders.measured {
-                asked = measured_ui(ui, measured, (problem, model_based), target, source);
-            } else {
-                let text = match phase {
-                    Phase::Died => "The network was lost with the training thread: train again.",
-                    _ => "They are measured when the training is paused or has ended.",
-                };
-                dim_ui(ui, text);
+        .show(ui, |ui| match &decoders.measured {
+            Some(measured) => asked = measured_ui(ui, measured, (problem, model_based), target, source),
+            None => {
+                dim_ui(ui, "They are measured when the training is paused or has ended.");
             }
         });
     focus_ring_ui(ui, &header.header_response);
@@ -298,8 +253,8 @@ fn measured_ui(
     measured: &[DecoderResult],
     (problem, model_based): (&Problem, Option<&Errors>),
     target: &mut usize,
-    source: Option<&DecoderSource>,
-) -> Option<FileTask> {
+    source: Option<&NetworkSource>,
+) -> Option<Exporting> {
     let palette = Theme::of(ui).palette;
     // Ratios to rounding are meaningless.
     let model_based = model_based.filter(|errors| !errors.is_rounding());
@@ -307,48 +262,51 @@ fn measured_ui(
         target_choice_ui(ui, "RMSE and R² of", "target of the decoders", &problem.targets, target);
     }
     let target = (*target).min(problem.targets.len().saturating_sub(1));
-    let mut figures = Figure::of(problem, model_based.is_some());
-    // In a narrow window the buttons at the end come first.
-    if ui.available_width() < space(80) {
-        figures.retain(|figure| *figure != Figure::R2);
-    }
-    let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::text(""))
-        .chain(figures.iter().map(|figure| figure.column()))
-        .chain([TableColumn::text("").width(ColumnWidth::Points(space(7)))])
-        .collect();
-    let asked = RefCell::new(None);
+    let figures = match (problem.has_nodes(), model_based) {
+        (true, Some(_)) => vec![PERCENT, TIMES, RESIDUAL, FRAME_TIME],
+        (true, None) => vec![PERCENT, RESIDUAL, FRAME_TIME],
+        // In a narrow window the buttons at the end come first.
+        (false, _) if ui.available_width() < space(80) => vec![RANGE_PERCENT, RMSE, FRAME_TIME],
+        (false, _) => vec![RANGE_PERCENT, RMSE, R2, FRAME_TIME],
+    };
+    let headings = figures
+        .iter()
+        .map(|figure| TableColumn::figure(figure.heading).meaning((figure.meaning)()));
+    let mut columns = vec![TableColumn::text("")];
+    columns.extend(headings);
+    columns.push(TableColumn::text("").width(ColumnWidth::Points(space(7))));
+    let asked = Cell::new(None);
     let rows = measured.iter().map(|result| {
         let cells = figures.iter().map(|figure| match &result.report {
             None => "…".to_owned(),
             Some(Err(_)) => format_number(None),
-            Some(Ok(report)) if *figure == Figure::R2 => format_r2(figure.value(report, model_based, target)),
-            Some(Ok(report)) => format_number(figure.value(report, model_based, target)),
+            Some(Ok(report)) => match (figure.value)(report, model_based, target) {
+                value if figure.heading == R2.heading => format_r2(value),
+                value => format_number(value),
+            },
         });
-        let colour = if result.kind == DecoderKind::Network {
-            palette.accent
-        } else {
-            palette.text
-        };
+        let is_network = result.kind == DecoderKind::Network;
         let row = TableRow::figures(result.kind.name(result.precision), cells)
             .meaning(result.kind.meaning())
-            .colour(colour);
-        // The menu has both precisions.
+            .colour(if is_network { palette.accent } else { palette.text });
+        // The dialog has both precisions.
         let source = source.filter(|_| result.precision == Precision::Double && matches!(result.report, Some(Ok(_))));
-        match source {
-            None => row,
-            Some(source) => row.controls(|ui| {
-                let button = Button::new("…").min_size(Vec2::splat(space(5)));
-                let task = decoder_export_ui(ui, button, result.kind, source);
-                if task.is_some() {
-                    asked.replace(task);
-                }
-            }),
-        }
+        let Some(source) = source else { return row };
+        row.controls(|ui| {
+            let button = ui.add(Button::new("…").min_size(Vec2::splat(space(5))));
+            let name = format!("Export {}…", result.kind.name(Precision::Double));
+            button.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
+            if button.on_hover_text(name).clicked() {
+                asked.set(Some(Exporting::decoder(result.kind, source.clone())));
+            }
+        })
     });
     let of_model_based = model_based.map(|errors| {
-        let cells = figures
-            .iter()
-            .map(|figure| format_number(figure.of_model_based(errors)));
+        let cells = figures.iter().map(|figure| match figure.heading {
+            heading if heading == PERCENT.heading => format_number(errors.z_percent),
+            heading if heading == TIMES.heading => format_number(1.0),
+            _ => format_number(None),
+        });
         TableRow::figures("model-based", cells)
             .meaning(glossary::MODEL_BASED.hint)
             .colour(palette.dim)
@@ -358,6 +316,7 @@ fn measured_ui(
     for result in measured {
         let name = result.kind.name(result.precision);
         match &result.report {
+            None => {}
             Some(Err(reason)) => {
                 note_ui(ui, &format!("{name}: {reason}"));
             }
@@ -366,7 +325,6 @@ fn measured_ui(
                     note_ui(ui, &format!("{name}: {remark}"));
                 }
             }
-            None => {}
         }
     }
     asked.into_inner()
@@ -409,41 +367,38 @@ mod tests {
         let run = Run::prepare(settings).unwrap();
         let (waking, woken) = channel();
         let wake = move || waking.send(()).unwrap_or(());
-        let (mut measuring, mut state) = (DecoderMeasuring::new(Arc::new(wake)), DecodersState::default());
-        state.measured = Some(DecoderResult::pending(run.problem()));
-        assert!(state.is_measuring());
+        let mut decoders = Decoders::new(Arc::new(wake));
         let mut impossible = settings;
         impossible.simulation_mut().unwrap().samples = 0;
-        measuring.begin(
+        decoders.begin(
             impossible.into(),
             Arc::clone(run.problem()),
             run.network(),
             Arc::clone(run.test()),
         );
-        while state.is_measuring() {
+        assert!(decoders.is_measuring());
+        while decoders.is_measuring() {
             woken.recv().unwrap();
-            measuring.take_events(&mut state);
+            decoders.take_events();
         }
-        assert!(!state.is_measuring());
-        for result in state.measured.iter().flatten() {
+        for result in decoders.measured.iter().flatten() {
             let reason = result.report.clone().unwrap().unwrap_err();
             assert!(reason.contains("training samples"), "{reason}");
         }
-        measuring.forget(&mut state);
-        assert!(state.measured.is_none());
+        decoders.forget();
+        assert!(decoders.measured.is_none());
     }
 
-    fn unfolded() -> DecodersState {
-        DecodersState {
-            is_open: true,
-            measured: Some(DecoderResult::pending(&Simulation::default().problem())),
-        }
-    }
-
-    fn shown(mut decoders: DecodersState) -> Harness<'static> {
+    /// The unfolded table with the report of one decoder.
+    fn shown(kind: DecoderKind, report: Result<DecoderReport, String>) -> Harness<'static> {
         let problem = Simulation::default().problem();
+        let mut measured = DecoderResult::pending(&problem);
+        let place = measured.iter().position(|result| result.kind == kind).unwrap();
+        measured[place].report = Some(report);
+        let mut decoders = Decoders::new(Arc::new(|| ()));
+        (decoders.is_open, decoders.measured) = (true, Some(measured));
         Harness::new_ui(move |ui| {
-            decoders_ui(ui, &mut decoders, Phase::Idle, (&problem, None), &mut 0, None);
+            decoders_ui(ui, &mut decoders, (&problem, None), &mut 0, None);
         })
     }
 
@@ -467,20 +422,13 @@ mod tests {
             .unwrap();
         let remark = report.remarks[0].to_string();
         assert!(remark.contains("times that of always answering the mean"), "{remark}");
-        let mut decoders = unfolded();
-        let place = DecoderResult::pending(&Simulation::default().problem())
-            .iter()
-            .position(|result| result.kind == DecoderKind::Ridge);
-        decoders.take(place.unwrap(), Ok(report));
-        let harness = shown(decoders);
+        let harness = shown(DecoderKind::Ridge, Ok(report));
         harness.get_by_label(&format!("Ridge: {remark}"));
     }
 
     #[test]
     fn a_decoder_that_fails_says_why_and_the_others_are_kept() {
-        let mut decoders = unfolded();
-        decoders.take(0, Err("no resistance at rest".to_owned()));
-        let harness = shown(decoders);
+        let harness = shown(DecoderKind::Mean, Err("no resistance at rest".to_owned()));
         harness.get_by_label("Training mean: no resistance at rest");
         harness.get_by_label("Training mean, Z %: –");
         harness.get_by_label("Newton, Z %: …");
@@ -488,7 +436,6 @@ mod tests {
 
     #[test]
     fn rows_that_were_not_solved_are_counted_below_the_table() {
-        let mut decoders = unfolded();
         // Four electrodes are too few for six nodes.
         let mut settings = Preset::Best.settings();
         settings.simulation_mut().unwrap().sensor.scale = "10x6_3x4".parse().unwrap();
@@ -500,12 +447,7 @@ mod tests {
             .measure(DecoderKind::Newton, Precision::Double, &test)
             .unwrap()
             .unwrap();
-        let place = DecoderResult::pending(&Simulation::default().problem())
-            .iter()
-            .position(|result| result.kind == DecoderKind::Newton)
-            .unwrap();
-        decoders.take(place, Ok(report));
-        let harness = shown(decoders);
+        let harness = shown(DecoderKind::Newton, Ok(report));
         harness.get_by_label_contains("Newton: 10 of 10 rows are not determined by their readings");
     }
 }

@@ -1,24 +1,26 @@
+//! Drawings of the test set and of the displayed result on it, for both sources.
+
 use std::{cell::OnceCell, sync::Arc};
 
+use decoupler_core::{dataset::Dataset, evaluation::node_rms_mm};
+use decoupler_files::figure::value_pairs;
 use ndarray::Array2;
 
 use crate::window::{
     shared::{RunResult, Shared},
-    test_view::{Frame, Positions, RecordedTest, TestView},
+    test_view::Drawing,
 };
-use decoupler_core::{dataset::Dataset, evaluation::node_rms_mm};
-use decoupler_files::figure::{TargetSurface, surface::Surface, value_pairs};
 
 /// Drawings of the current test set. They are rebuilt only when it, the result, the snapshot or the target changes.
 #[derive(Debug, Default)]
 pub struct Drawn {
-    /// The displayed snapshot.
-    pub frames: Frames,
+    /// The surfaces of the displayed snapshot; `None` where no surface goes through the targets of a recording.
+    pub surfaces: Option<Drawing>,
     /// Drops of its readings below those at rest, in percent: rows read × M4.
     pub drops_percent: Option<Array2<f64>>,
-    /// Surfaces of a sample of a recording, where one goes through its targets: actual, decoded, and their difference.
-    pub target_surfaces: Option<[Surface; 3]>,
-    of: Option<Of>,
+    /// The test set, and the outputs of the network on it.
+    test: Option<Arc<Dataset>>,
+    answers: Option<Arc<Array2<f64>>>,
     snapshot: usize,
     /// The target of [`Self::pairs`]; none for the nodes of an array.
     target: Option<usize>,
@@ -26,30 +28,8 @@ pub struct Drawn {
     pairs: OnceCell<Vec<(f64, f64)>>,
 }
 
-/// The displayed snapshot. For a recording the height of a node is the value of its target, in its unit.
-#[derive(Clone, Debug, Default)]
-pub struct Frames {
-    /// Actual surface.
-    pub actual: Frame,
-    /// Surface decoded by the network, and its error (decoupled − actual).
-    pub decoupled: Option<(Frame, Frame)>,
-}
-
-/// A test set and the outputs of the network on it.
-#[derive(Debug)]
-struct Of {
-    test: Arc<Dataset>,
-    answers: Option<Arc<Array2<f64>>>,
-}
-
-impl Of {
-    fn is(&self, test: &Arc<Dataset>, answers: Option<&Arc<Array2<f64>>>) -> bool {
-        let is_same_result = match (&self.answers, answers) {
-            (Some(one), Some(other)) => Arc::ptr_eq(one, other),
-            (one, other) => one.is_none() && other.is_none(),
-        };
-        is_same_result && Arc::ptr_eq(&self.test, test)
-    }
+fn is_same<T>(one: Option<&Arc<T>>, other: Option<&Arc<T>>) -> bool {
+    one.map(Arc::as_ptr) == other.map(Arc::as_ptr)
 }
 
 impl Drawn {
@@ -62,114 +42,43 @@ impl Drawn {
         snapshot: usize,
         target: usize,
     ) -> usize {
-        match (shared.test(), shared.recorded_test()) {
-            (Some(test), _) => self.follow_array(test, result, snapshot),
-            (None, Some(test)) => self.follow_recording(test, result, snapshot, target),
-            (None, None) => {
-                *self = Self::default();
-                snapshot
-            }
-        }
-    }
-
-    /// Discards drawings of another test set, result or snapshot. Returns true if everything is up to date.
-    fn is_drawn(&mut self, test: &Arc<Dataset>, result: Option<&RunResult>, snapshot: usize) -> bool {
-        let answers = result.map(|result| &result.answers);
-        let is_same = self.of.as_ref().is_some_and(|of| of.is(test, answers));
-        if is_same && self.snapshot == snapshot {
-            return true;
-        }
-        if !is_same {
-            let is_same_test = self.of.as_ref().is_some_and(|of| Arc::ptr_eq(&of.test, test));
-            // The actual surface stays while the network is trained.
-            let actual = if is_same_test && self.snapshot == snapshot {
-                std::mem::take(&mut self.frames.actual)
-            } else {
-                Frame::default()
-            };
-            *self = Self {
-                of: Some(Of {
-                    test: Arc::clone(test),
-                    answers: answers.cloned(),
-                }),
-                frames: Frames {
-                    actual,
-                    decoupled: None,
-                },
-                ..Self::default()
-            };
-        } else {
-            self.frames = Frames::default();
-        }
-        self.snapshot = snapshot;
-        false
-    }
-
-    fn follow_array(&mut self, test: &TestView, result: Option<&RunResult>, snapshot: usize) -> usize {
-        let snapshot = test.nearest_snapshot(snapshot);
-        if self.is_drawn(&test.set, result, snapshot) {
+        let (array, recording) = (shared.test(), shared.recorded_test());
+        let Some(test) = array.map(|array| &array.set).or(recording.map(|test| &test.set)) else {
+            *self = Self::default();
             return snapshot;
+        };
+        let snapshots = array.map_or(test.samples(), |array| array.snapshots.len());
+        let snapshot = snapshot.min(snapshots.saturating_sub(1));
+        let (answers, target) = (result.map(|result| &result.answers), recording.map(|_| target));
+        let is_same_test = is_same(self.test.as_ref(), Some(test));
+        let is_same_result = is_same_test && is_same(self.answers.as_ref(), answers);
+        if !is_same_result || self.target != target {
+            self.pairs = OnceCell::new();
         }
-        self.drops_percent = test.drops_percent(&test.readings_ohm(snapshot));
-        if self.frames.actual.nodes_mm.is_empty() {
-            self.frames.actual = test.frame(test.set.targets(), snapshot);
+        if !is_same_result {
+            self.spread_mm = OnceCell::new();
         }
-        let actual = &self.frames.actual;
-        self.frames.decoupled = result.map(|result| {
-            let decoupled = match &result.frame {
-                Some((of, frame)) if *of == snapshot => frame.clone(),
-                _ => test.frame(result.answers.view(), snapshot),
+        if !is_same_result || self.snapshot != snapshot {
+            let answers = answers.map(|answers| &**answers);
+            self.drops_percent = array.and_then(|test| test.drops_percent(&test.readings_ohm(snapshot)));
+            self.surfaces = match array {
+                Some(test) => Some(test.drawing(answers, snapshot)),
+                None => recording.and_then(|test| test.drawing(answers, snapshot)),
             };
-            let error = actual.error_of(&decoupled);
-            (decoupled, error)
-        });
+        }
+        (self.test, self.answers) = (Some(Arc::clone(test)), answers.cloned());
+        (self.snapshot, self.target) = (snapshot, target);
         snapshot
     }
 
-    fn follow_recording(
-        &mut self,
-        test: &RecordedTest,
-        result: Option<&RunResult>,
-        sample: usize,
-        target: usize,
-    ) -> usize {
-        let sample = sample.min(test.set.samples().saturating_sub(1));
-        let is_drawn = self.is_drawn(&test.set, result, sample);
-        if self.target != Some(target) {
-            (self.target, self.pairs) = (Some(target), OnceCell::new());
-        }
-        if let (false, Positions::Surface(through)) = (is_drawn, &test.positions) {
-            self.draw_targets(test, through, result);
-        }
-        sample
-    }
-
-    /// Draws the surfaces through the displayed targets of the sample.
-    fn draw_targets(&mut self, test: &RecordedTest, through: &TargetSurface, result: Option<&RunResult>) {
-        let actual = test.set.targets().row(self.snapshot).to_vec();
-        let decoded = result.map(|result| result.answers.row(self.snapshot).to_vec());
-        let range = through.range_of(&test.ranges);
-        let surfaces = through.surfaces(&actual, decoded.as_ref().unwrap_or(&actual), range);
-        let [actual, found, error] = surfaces.each_ref().map(|surface| Frame {
-            nodes_mm: Arc::clone(&surface.nodes),
-            grid_mm: Arc::clone(&surface.values),
-        });
-        self.frames = Frames {
-            actual,
-            decoupled: decoded.map(|_| (found, error)),
-        };
-        self.target_surfaces = Some(surfaces);
-    }
-
     fn result(&self) -> Option<(&Dataset, &Array2<f64>)> {
-        let of = self.of.as_ref()?;
-        Some((&of.test, of.answers.as_ref()?))
+        Some((self.test.as_deref()?, self.answers.as_deref()?))
     }
 
     /// Returns the root mean square error of each node, once there is a result: [`node_rms_mm`].
     pub(super) fn spread_mm(&self) -> Option<&[f64]> {
-        let (test, decoupled_mm) = self.result()?;
-        Some(self.spread_mm.get_or_init(|| node_rms_mm(test, decoupled_mm)))
+        let (test, decoded_mm) = self.result()?;
+        Some(self.spread_mm.get_or_init(|| node_rms_mm(test, decoded_mm)))
     }
 
     /// Actual and decoded values of the test set, once there is a result: z of the nodes of an array in millimetres, or the
@@ -183,15 +92,8 @@ impl Drawn {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::window::{
-        shared::RunView,
-        test_view::TestSet,
-        training_worker::{Began, RunId},
-    };
-    use decoupler_core::{
-        dataset::SplitBy,
-        evaluation::{Run, RunSettings},
-    };
+    use crate::window::{shared::RunView, training_worker::RunId};
+    use decoupler_core::evaluation::{Run, RunSettings};
 
     fn result(run: &Run) -> RunResult {
         let decoupled_mm = run.decouple_test();
@@ -202,7 +104,6 @@ mod tests {
             charts: None,
             remarks: Vec::new(),
             coverage: Vec::new(),
-            frame: None,
             best_epoch: 0,
             defect: None,
             epochs_run: 0,
@@ -227,32 +128,23 @@ mod tests {
         ) = (20, 8);
         let mut run = Run::prepare(settings).unwrap();
         let mut shared = Shared::new(true);
-        shared.run = Some(RunView::new(Began {
-            id: RunId::new(),
-            asked: settings.into(),
-            setup: settings.into(),
-            search: None,
-            problem: Arc::clone(run.problem()),
-            weights: 0,
-            test: TestSet::of(&run, SplitBy::Time).unwrap(),
-            baselines: run.baselines().unwrap().clone(),
-        }));
+        shared.run = Some(RunView::begun(RunId::new(), &run, None, None).unwrap());
         let mut drawn = Drawn::default();
         drawn.follow(&shared, shared.result(), 0, 0);
-        assert!(drawn.pairs().is_none() && drawn.frames.decoupled.is_none());
+        assert!(drawn.pairs().is_none() && drawn.surfaces.as_ref().unwrap().decoded.is_none());
 
         shared.run.as_mut().unwrap().result = Some(result(&run));
         assert_eq!(drawn.follow(&shared, shared.result(), 0, 0), 0);
         let first = value_pairs(run.test(), &run.decouple_test(), None);
         assert_eq!(drawn.pairs(), Some(&first[..]));
         let (pairs, spread) = (drawn.pairs().unwrap().as_ptr(), drawn.spread_mm().unwrap().as_ptr());
-        let actual = drawn.frames.actual.nodes_mm.clone();
+        let actual = drawn.surfaces.as_ref().unwrap().actual.nodes.clone();
         assert_eq!(
             drawn.follow(&shared, shared.result(), 1_000_000, 0),
             3,
             "the last of four snapshots"
         );
-        assert_ne!(drawn.frames.actual.nodes_mm, actual);
+        assert_ne!(drawn.surfaces.as_ref().unwrap().actual.nodes, actual);
         assert_eq!(
             drawn.pairs().unwrap().as_ptr(),
             pairs,

@@ -1,87 +1,54 @@
 //! Report of a training in figures.
-//!
-//! Note of the report on ill-conditioned scenes.
 
 use std::time::Duration;
 
 use decoupler_core::{
     dataset::SplitBy,
-    evaluation::{
-        Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Scores, Spread, StartRecord, TestErrors,
-        auto::{Tried, TriedModel},
-        best_start, error_remarks,
-    },
+    evaluation::{Combination, ErrorTable, Scores, Spread, StartRecord, TestErrors, best_start, error_remarks},
     identifiability::Identifiability,
-    problem::Problem,
-    text::counted,
     training::StopReason,
 };
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number},
+    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number, search_table},
     figure::frame_time,
 };
-use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Layout, Response, RichText, Ui};
 
+use super::{decoders::decoders_ui, exports::open_task, press::press_section_ui, recording::bias, view::TrainView};
 use crate::window::{
     glossary,
-    shared::{
-        DecoderSource, Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence,
-    },
+    shared::{Effect, NetworkSource, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
     test_view::TestView,
-    theme::{Theme, space, type_size},
-    views::train::{
-        decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
-        view::TrainView,
-    },
+    theme::{space, type_size},
     widgets::{
-        Landmark, described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
+        described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
         section_heading_ui,
     },
 };
 
-/// The error table, the buttons that open a checkpoint, and the cost of the training. Before a training, the baselines.
+/// The name of the network's row.
+const NETWORK: &str = "network";
+
+/// The error table, the button that opens a checkpoint, and the cost of the training. Before a training, the baselines.
 pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
         press_section_ui(ui, &mut view.press, shared);
-        let heading = section_heading_ui(ui, "Errors on the test set");
+        section_heading_ui(ui, "Errors on the test set");
         let result = view.result(shared).cloned();
         let shown = shared.shown_run().zip(result.as_ref());
-        if let Some((run, result)) = shown {
-            let baselines = &run.baselines;
-            error_table_ui(ui, &run.error_table(result));
-            match view.scrub.epoch() {
-                Some(_) => {
-                    dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
-                }
-                None => verdict_ui(ui, shared, run, result),
-            }
-            if let Some(test) = run.test.array() {
-                conditioning_ui(ui, test);
-            }
-            if let Some(note) = baselines.model_based_note() {
-                note_ui(ui, note);
-            }
-            if let (Some(worst), Some(test)) = (worst_node_ui(ui, result), run.test.array()) {
-                view.go_to(TestPlace::of_node(worst, test));
-            }
-            let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
-            let measured = (&*run.problem, model_based);
-            let is_open = view.decoders.is_open;
-            let run_source = || NetworkSource::Training(run.id, Box::new(run.setup.clone()));
-            let source = is_open.then(|| DecoderSource::Run(run_source()));
-            let (decoders, target) = (&mut view.decoders, &mut view.target);
-            let asked = decoders_ui(ui, decoders, shared.phase, measured, target, source.as_ref());
-            effects.extend(asked.map(Effect::ChooseFile));
-            effective_parameters_ui(ui, run, result);
-            spread_ui(ui, &run.problem, run.settings().combine, &run.starts);
-            search_ui(ui, run);
-        } else {
-            expectation_ui(ui, shared);
+        match shown {
+            Some((run, result)) => errors_ui(ui, view, shared, (run, result), effects),
+            None => expectation_ui(ui, shared),
         }
-        Landmark::Errors.stands_at(ui, ui.min_rect().with_min_y(heading.rect.top()));
         section_heading_ui(ui, "Open");
-        let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
-        ui.add_enabled_ui(can_open, |ui| open_ui(ui, shared, effects));
+        let can_open = !shared.phase.is_busy();
+        ui.add_enabled_ui(can_open, |ui| {
+            let button = ghost_button("Open checkpoint…").min_size([ui.available_width(), space(7)].into());
+            let task = open_task(shared);
+            if ui.add(button).on_hover_text(task.words.description).clicked() {
+                effects.push(Effect::ChooseFile(task));
+            }
+        });
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
             cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
@@ -89,78 +56,108 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
     });
 }
 
-/// The candidates from which the settings were chosen, folded.
+/// The errors of the displayed network, what they mean, and how they came about.
+fn errors_ui(
+    ui: &mut Ui,
+    view: &mut TrainView,
+    shared: &Shared,
+    (run, result): (&RunView, &RunResult),
+    effects: &mut Vec<Effect>,
+) {
+    error_table_ui(ui, &run.error_table(result));
+    match (view.scrub.epoch(), run.stop_reason) {
+        (Some(_), _) => {
+            dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
+        }
+        (None, Some(reason)) => verdict_ui(ui, shared, (run, result), reason),
+        (None, None) => {}
+    }
+    if let Some(test) = run.test.array() {
+        conditioning_ui(ui, test);
+    }
+    if let Some(note) = run.baselines.model_based_note() {
+        note_ui(ui, note);
+    }
+    if let (Some(errors), Some(test)) = (result.errors.nodes(), run.test.array()) {
+        let worst = errors.worst_node;
+        ui.add_space(space(1));
+        let text = format!("Worst node {} mm", format_number(errors.worst_mm));
+        let text = RichText::new(text).size(type_size().note);
+        let show_ui = |ui: &mut Ui| {
+            let [snapshot, row, node] = [worst.snapshot, worst.row, worst.node].map(|place| place + 1);
+            let hint = format!("Go to snapshot {snapshot}, row {row}, node {node}");
+            ui.small_button("Show").on_hover_text(hint)
+        };
+        let (name, show) = line_ui(ui, text, show_ui);
+        name.on_hover_text(glossary::WORST_NODE.hint);
+        if show.clicked() {
+            view.go_to(worst.snapshot, test.node(worst));
+        }
+    }
+    let model_based = run.baselines.model_based.as_ref().and_then(TestErrors::nodes);
+    let source = { view.decoders.is_open }.then(|| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
+    let (decoders, target) = (&mut view.decoders, &mut view.target);
+    let measured = (&*run.problem, model_based);
+    let asked = decoders_ui(ui, decoders, measured, target, source.as_ref());
+    effects.extend(asked.map(|exporting| Effect::Export(Box::new(exporting))));
+    let best = run.history.get(result.best_epoch);
+    if let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) {
+        let effective = format_number(effective);
+        let text = format!("Effective parameters {effective} of {} weights", run.weights);
+        ui.label(RichText::new(text).size(type_size().note))
+            .on_hover_text(glossary::EFFECTIVE_PARAMETERS.hint);
+    }
+    spread_ui(ui, run);
+    search_ui(ui, run);
+}
+
+/// A name, and its value at the right end of the line.
+fn line_ui(ui: &mut Ui, name: RichText, value_ui: impl FnOnce(&mut Ui) -> Response) -> (Response, Response) {
+    ui.horizontal(|ui| {
+        let layout = Layout::right_to_left(Align::Center);
+        (ui.label(name), ui.with_layout(layout, value_ui).inner)
+    })
+    .inner
+}
+
+/// The candidates from which the settings were chosen, folded; those with the lowest errors first.
 fn search_ui(ui: &mut Ui, run: &RunView) {
     let Some(search) = &run.search else { return };
+    let mut table = search_table(search);
+    let place = |heading: &str| table.columns.iter().position(|column| column.heading == heading);
+    if let (Some(model), Some(error)) = (place("model"), place("error")) {
+        let error_of = |row: &[Cell]| row[error].number().unwrap_or(f64::INFINITY);
+        table
+            .rows
+            .sort_by(|one, other| error_of(one).total_cmp(&error_of(other)));
+        table.columns.swap(0, model);
+        table.rows.iter_mut().for_each(|row| row.swap(0, model));
+    }
     let summary = format!("{} tried", search.tried.len());
     fold_ui(ui, "Choice of settings", &summary, |ui| {
         dim_ui(ui, &format!("{}.", describe_search(search)));
-        dim_ui(
-            ui,
-            "Cross-validation error, % of the targets' standard deviation, best first:",
-        );
-        let mut candidates: Vec<(usize, &Tried)> = search.tried.iter().enumerate().collect();
-        candidates.sort_by(|(_, one), (_, other)| one.error.total_cmp(&other.error));
-        for (place, tried) in candidates {
-            ui.scope(|ui| tried_ui(ui, tried, place == search.chosen || tried.share > 0.0));
-        }
+        described_table_ui(ui, "candidates", &table);
         for remark in search.remarks(&run.problem.targets) {
             note_ui(ui, &remark);
         }
     });
 }
 
-/// A candidate in two lines that fit the card: model and error, inputs and epochs.
-fn tried_ui(ui: &mut Ui, tried: &Tried, is_chosen: bool) {
-    let palette = Theme::of(ui).palette;
-    let mark = if is_chosen { "* " } else { "" };
-    let colour = if is_chosen { palette.accent } else { palette.text };
-    let error = format!("{:.1} ± {:.1} %", 100.0 * tried.error, 100.0 * tried.standard_error);
-    ui.spacing_mut().item_spacing.y = 0.0;
-    ui.spacing_mut().interact_size.y = space(5);
-    ui.horizontal(|ui| {
-        ui.label(RichText::new(format!("{mark}{}", tried.model)).color(colour));
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            ui.label(RichText::new(error).color(colour));
-        });
-    });
-    let mut text = tried.features();
-    if tried.share > 0.0 {
-        text = format!("{:.0} % of the answer; {text}", 100.0 * tried.share);
-    }
-    if let TriedModel::Network { begin, epochs, .. } = tried.model {
-        text += &format!("; {}", counted(epochs, "epoch"));
-        if begin != Initialization::default() {
-            text += &format!(" from {begin}");
-        }
-        if tried.is_cut_off {
-            text += ", cut off by the budget";
-        }
-    }
-    dim_ui(ui, &text);
-    ui.add_space(space(1));
-}
-
 /// The table with the network's row still empty.
 fn expectation_ui(ui: &mut Ui, shared: &Shared) {
     if shared.source == SourceKind::Recording {
-        dim_ui(
-            ui,
-            "Press Train: the errors of each target appear here, next to those of the mean and of ridge regression.",
-        );
+        let text =
+            "Press Train: the errors of each target appear here, next to those of the mean and of ridge regression.";
+        dim_ui(ui, text);
         return;
     }
-    let known = shared.preview.as_ref();
-    let compared = known.and_then(|preview| {
-        let simulation = preview.settings.simulation()?;
-        Some((preview, simulation, preview.baselines.clone()?))
-    });
-    if let Some((preview, simulation, baselines)) = compared {
+    let preview = shared.preview.as_ref();
+    let known = preview.and_then(|preview| Some((preview, preview.settings.simulation()?, preview.baselines.clone()?)));
+    if let Some((preview, simulation, baselines)) = known {
         // The settings may have changed to a scene whose baselines are still being computed.
-        let is_of_draft = shared
-            .draft
-            .simulation()
-            .is_some_and(|of_draft| (simulation.sensor, simulation.scene) == (of_draft.sensor, of_draft.scene));
+        let draft = shared.draft.simulation();
+        let is_of_draft =
+            draft.is_some_and(|draft| (simulation.sensor, simulation.scene) == (draft.sensor, draft.scene));
         let published = shared.draft.published().filter(|_| is_of_draft);
         let scores = Scores {
             network: baselines.mean.clone(),
@@ -170,147 +167,82 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         };
         let mut tables = ErrorTable::of_scores(&simulation.problem(), &scores, published.as_ref());
         let rows = tables.iter_mut().flat_map(|table| &mut table.rows);
-        for row in rows.filter(|row| row.name == NETWORK) {
-            row.errors.fill(None);
-        }
+        rows.filter(|row| row.name == NETWORK)
+            .for_each(|row| row.errors.fill(None));
         error_table_ui(ui, &tables);
         conditioning_ui(ui, &preview.test);
         ui.add_space(space(2));
     }
-    let text = "Press Train to fill in the network's row.";
     // The paper's own network, not only its scene.
-    if shared.draft.published().is_some() {
-        dim_ui(ui, &format!("{text} The paper's network takes a few seconds."));
-    } else {
-        dim_ui(ui, text);
-    }
+    dim_ui(
+        ui,
+        match shared.draft.published() {
+            Some(_) => "Press Train to fill in the network's row. The paper's network takes a few seconds.",
+            None => "Press Train to fill in the network's row.",
+        },
+    );
 }
 
-/// The name of the network's row.
-const NETWORK: &str = "network";
-
-/// Reports where a baseline is better and what would help, or by how much the network is better; nothing during training.
-fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
-    let Some(reason) = run.stop_reason else { return };
+/// Reports where a baseline is better and what would help, or by how much the network is better.
+fn verdict_ui(ui: &mut Ui, shared: &Shared, (run, result): (&RunView, &RunResult), reason: StopReason) {
     ui.add_space(space(2));
-    match (result.errors.nodes(), run.baselines.linear.nodes()) {
-        (Some(errors), Some(linear)) => {
-            verdict_on_nodes_ui(ui, (run, result, reason), errors, linear);
-        }
-        _ => verdict_on_targets_ui(ui, run, result),
+    let (settings, baselines) = (run.settings(), &run.baselines);
+    let defect = result.defect.clone();
+    let (faults, praise) = if let (Some(errors), Some(linear)) = (result.errors.nodes(), baselines.linear.nodes()) {
+        let remarks = error_remarks(settings, &run.scores(result), Some(reason));
+        let remark = remarks.iter().find(|(row, _)| *row == NETWORK);
+        let remark = remark.map(|(row, remark)| format!("{row}: {remark}"));
+        let is_worse = (errors.z_mm > linear.z_mm).then(|| {
+            let remedy = reason.remedy(&settings.training.method);
+            format!("a linear map of the resistances is better on z than this network: {remedy}")
+        });
+        let fault = defect.or(remark).or(is_worse);
+        let praise = (fault.is_none() && errors.z_mm > 0.0).then(|| {
+            let text = format!(
+                "On z {} times as accurate as the linear map",
+                format_number(linear.z_mm / errors.z_mm)
+            );
+            let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
+            match model_based.and_then(|model_based| errors.times(model_based)) {
+                None => format!("{text}."),
+                Some(ratio) => format!("{text}; {} times the model-based error.", format_number(ratio)),
+            }
+        });
+        (Vec::from_iter(fault.map(|fault| capitalised(&fault))), praise)
+    } else {
+        let pairs = result.errors.targets().iter().zip(baselines.linear.targets());
+        let ratios = pairs.map(|(network, ridge)| ridge.rmse / network.rmse);
+        let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
+        let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
+        let is_better = defect.is_none() && ratios.iter().all(|ratio| *ratio > 1.0);
+        let range = extreme(f64::min).zip(extreme(f64::max)).filter(|_| is_better);
+        let praise = range.map(|(low, high)| {
+            let times = if low == high { low } else { format!("{low} to {high}") };
+            format!("{times} times as accurate as ridge regression.")
+        });
+        let defect = defect.map(|defect| capitalised(&defect)).into_iter();
+        (defect.chain(result.remarks.iter().cloned()).collect(), praise)
+    };
+    for fault in &faults {
+        note_ui(ui, &sentence(fault));
+    }
+    if let Some(praise) = praise {
+        dim_ui(ui, &praise);
+    }
+    let plan = run.setup.plan();
+    if plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random) {
+        note_ui(ui, bias(SplitBy::Random));
     }
     if shared.setup().is_ok_and(|setup| setup != run.asked) {
         dim_ui(ui, "The settings have changed since this training.");
     }
 }
 
-/// Remarks on the errors of a recording, or by how much the network is better than ridge regression.
-fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
-    let defect = result.defect.as_ref().map(|defect| capitalised(defect));
-    for remark in defect.iter().chain(&result.remarks) {
-        note_ui(ui, &sentence(remark));
-    }
-    let (network, ridge) = (result.errors.targets(), run.baselines.linear.targets());
-    let ratios = network
-        .iter()
-        .zip(ridge)
-        .map(|(network, ridge)| ridge.rmse / network.rmse);
-    let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
-    let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
-    if let (true, Some(low), Some(high)) = (defect.is_none(), extreme(f64::min), extreme(f64::max))
-        && ratios.iter().all(|ratio| *ratio > 1.0)
-    {
-        let times = if low == high { low } else { format!("{low} to {high}") };
-        dim_ui(ui, &format!("{times} times as accurate as ridge regression."));
-    }
-    let plan = run.setup.plan();
-    if plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random) {
-        note_ui(ui, bias(SplitBy::Random));
-    }
-}
-
-fn verdict_on_nodes_ui(
-    ui: &mut Ui,
-    (run, result, reason): (&RunView, &RunResult, StopReason),
-    errors: &Errors,
-    linear: &Errors,
-) {
-    let settings = run.settings();
-    let remarks = error_remarks(settings, &run.scores(result), Some(reason));
-    let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
-    let fault = if let Some(defect) = &result.defect {
-        Some(defect.clone())
-    } else if let Some((row, remark)) = of_network {
-        Some(format!("{row}: {remark}"))
-    } else if errors.z_mm > linear.z_mm {
-        let remedy = reason.remedy(&settings.training.method);
-        Some(format!(
-            "a linear map of the resistances is better on z than this network: {remedy}"
-        ))
-    } else {
-        None
-    };
-    if let Some(fault) = fault {
-        note_ui(ui, &sentence(&capitalised(&fault)));
-    } else if errors.z_mm > 0.0 {
-        let times = format_number(linear.z_mm / errors.z_mm);
-        let model_based = run.baselines.model_based.as_ref().and_then(TestErrors::nodes);
-        let ratio = model_based.and_then(|model_based| errors.times(model_based));
-        let text = match ratio.map(format_number) {
-            None => format!("On z {times} times as accurate as the linear map."),
-            Some(ratio) => {
-                format!("On z {times} times as accurate as the linear map; {ratio} times the model-based error.")
-            }
-        };
-        dim_ui(ui, &text);
-    }
-}
-
-/// Returns the worst node, if the user wants to see it.
-fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
-    let mut is_wanted = false;
-    let errors = result.errors.nodes()?;
-    let worst = errors.worst_node;
-    ui.add_space(space(1));
-    ui.horizontal(|ui| {
-        let text = format!("Worst node {} mm", format_number(errors.worst_mm));
-        ui.label(RichText::new(text).size(type_size().note))
-            .on_hover_text(glossary::WORST_NODE.hint);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let place = format!(
-                "snapshot {}, row {}, node {}",
-                worst.snapshot + 1,
-                worst.row + 1,
-                worst.node + 1
-            );
-            let show = ui.small_button("Show").on_hover_text(format!("Go to {place}"));
-            is_wanted = show.clicked();
-        });
-    });
-    is_wanted.then_some(worst)
-}
-
-/// Shows the number of weights that the data determine, where the method estimates it.
-fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
-    let best = run.history.get(result.best_epoch);
-    let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) else {
-        return;
-    };
-    let text = format!(
-        "Effective parameters {} of {} weights",
-        format_number(effective),
-        run.weights
-    );
-    ui.label(RichText::new(text).size(type_size().note))
-        .on_hover_text(glossary::EFFECTIVE_PARAMETERS.hint);
-}
-
 fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let epochs = result.epochs_run;
-    let training = if run.settings().starts > 1 {
-        "Training, all starts"
-    } else {
-        "Training"
+    let training = match run.settings().starts {
+        ..=1 => "Training",
+        _ => "Training, all restarts",
     };
     let text = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
     let mut rows = vec![(training, text(result.wall_time))];
@@ -320,58 +252,28 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        let decoding = if run.problem.has_nodes() {
-            "Decoding a snapshot"
-        } else {
-            "Decoding a sample"
+        let decoding = match run.problem.has_nodes() {
+            true => "Decoding a snapshot",
+            false => "Decoding a sample",
         };
         rows.push((decoding, frame_time(1e6 * time.as_secs_f64())));
     }
     for (name, value) in rows {
-        ui.horizontal(|ui| {
-            ui.label(name);
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(value));
-        });
+        line_ui(ui, name.into(), |ui| ui.label(value));
     }
 }
 
-const PATH_BUTTON_WIDTH: f32 = space(24);
-
-/// Two buttons that ask for the path of a checkpoint.
-fn open_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-    ui.horizontal(|ui| {
-        let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
-        let button = ghost_button("Open checkpoint…").min_size([width, space(7)].into());
-        let task = open_task(shared);
-        if ui.add(button).on_hover_text(task.words.description).clicked() {
-            effects.push(Effect::ChooseFile(task.clone()));
-        }
-        let path = ui.add(ghost_button("Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
-        let is_enabled = path.enabled();
-        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, "Type the path of a checkpoint"));
-        if path
-            .on_hover_text("Type the path instead of choosing the file.")
-            .clicked()
-        {
-            effects.push(Effect::TypePath(task));
-        }
-    });
-}
-
-fn is_badly_conditioned(outlook: &Outlook) -> bool {
-    outlook.worst_row.condition() >= Identifiability::LARGEST_CONDITION
-}
-
 /// Notes that the scene is ill-conditioned, so that its errors are not blamed on the network.
-pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
-    let Some(outlook) = test.outlook.as_ref().filter(|outlook| is_badly_conditioned(outlook)) else {
+fn conditioning_ui(ui: &mut Ui, test: &TestView) {
+    let condition = test.outlook.as_ref().map(|outlook| outlook.worst_row.condition());
+    let Some(condition) = condition.filter(|condition| *condition >= Identifiability::LARGEST_CONDITION) else {
         return;
     };
-    ui.add_space(space(2));
-    let condition = match outlook.worst_row.condition() {
-        condition if condition.is_finite() => format!("{condition:.0e}"),
-        _ => "infinite".to_owned(),
+    let condition = match condition.is_finite() {
+        true => format!("{condition:.0e}"),
+        false => "infinite".to_owned(),
     };
+    ui.add_space(space(2));
     let text = format!(
         "This scene is ill-conditioned (condition number {condition}): no decoder can \
          distinguish some deformations. The note under Scene says what to change."
@@ -380,43 +282,46 @@ pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
 }
 
 /// Shows the spread of the results of several starts: three figures of each error. Nothing for one start.
-pub fn spread_ui(ui: &mut Ui, problem: &Problem, combine: Combination, starts: &[StartRecord]) {
+fn spread_ui(ui: &mut Ui, run: &RunView) {
+    let starts = &run.starts;
     let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
         return;
     };
-    let palette = Theme::of(ui).palette;
-    section_heading_ui(ui, &format!("Spread over {} starts", starts.len()));
-    let spread = Spread::of(starts.iter().filter_map(StartRecord::percent));
-    let of_test = problem.test_percent_name();
+    section_heading_ui(ui, &format!("Spread over {} restarts", starts.len()));
     let is_held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if is_held_out { "validation mse" } else { "training mse" };
-    let errors = Spread::of(starts.iter().map(StartRecord::deciding_mse));
-    described_table_ui(ui, "spread", &spread_table(&[(of_test, spread), (error, errors)]));
-    let text = match combine {
-        Combination::Best => format!("Start {} is kept: it has the lowest {error}.", best + 1),
-        Combination::Mean => format!(
-            "The mean of all starts is kept; start {} has the lowest {error}.",
-            best + 1
+    let spreads = [
+        (
+            run.problem.test_percent_name(),
+            Spread::of(starts.iter().filter_map(StartRecord::percent)),
         ),
+        (error, Spread::of(starts.iter().map(StartRecord::deciding_mse))),
+    ];
+    let row = |(name, spread): (&str, Option<Spread>)| {
+        let Spread {
+            smallest,
+            median,
+            largest,
+            ..
+        } = spread?;
+        Some(vec![Cell::from(name), smallest.into(), median.into(), largest.into()])
     };
-    ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
-}
-
-/// The figures of each spread.
-fn spread_table(spreads: &[(&'static str, Option<Spread>)]) -> Table {
-    let row = |(name, spread): &(&'static str, Option<Spread>)| {
-        let figures = spread.map(|spread| [spread.smallest, spread.median, spread.largest]);
-        let cells = figures?.map(Cell::from);
-        Some([vec![(*name).into()], cells.into()].concat())
-    };
-    Table {
+    let table = Table {
         columns: vec![
             TableColumn::new("error", "", ""),
-            TableColumn::new("min", "min", "").meaning("Best start."),
-            TableColumn::new("median", "median", "")
-                .meaning("Median of all starts: the typical result of a single start."),
-            TableColumn::new("max", "max", "").meaning("Worst start."),
+            TableColumn::field("min").meaning("Best start."),
+            TableColumn::field("median").meaning("Median of all starts: the typical result of a single start."),
+            TableColumn::field("max").meaning("Worst start."),
         ],
-        rows: spreads.iter().filter_map(row).collect(),
-    }
+        rows: spreads.into_iter().filter_map(row).collect(),
+    };
+    described_table_ui(ui, "spread", &table);
+    let best = best + 1;
+    dim_ui(
+        ui,
+        &match run.settings().combine {
+            Combination::Best => format!("Start {best} is kept: it has the lowest {error}."),
+            Combination::Mean => format!("The mean of all starts is kept; start {best} has the lowest {error}."),
+        },
+    );
 }

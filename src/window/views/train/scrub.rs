@@ -1,14 +1,14 @@
-//! Scrubbing: the networks of past epochs, selected with a slider under the loss curves or replayed one after the other.
-//! Their results on the test set are computed in the background; the latest request wins.
+//! Scrubbing: the networks of past epochs, selected with a slider under the charts or replayed one after the other. Their
+//! results on the test set are computed in the background; the latest request wins.
 
 use std::{sync::Arc, time::Duration};
 
-use decoupler_core::{decoupling::ProgramDecoder, evaluation::TestErrors, network::Networks, problem::Problem};
+use decoupler_core::{decoupling::ProgramDecoder, evaluation::TestErrors, problem::Problem};
 use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
     job::{Background, JobError, Wake},
-    shared::{RunResult, RunView, Shared},
+    shared::{Effect, Matter, Notice, RunResult, Shared},
     test_view::TestSet,
     theme::{Theme, space, type_size},
     training_worker::{PastNetworks, RunId},
@@ -17,6 +17,8 @@ use crate::window::{
 
 /// Time of a replay, in seconds.
 const REPLAY_SECONDS: f64 = 6.0;
+/// Time between two frames of a replay.
+const FRAME: Duration = Duration::from_millis(33);
 
 /// The displayed past epoch, if one is.
 #[derive(Debug)]
@@ -28,8 +30,6 @@ pub struct ScrubState {
     /// Result of the network of an epoch.
     result: Option<RunResult>,
     job: Background<Result<Option<RunResult>, JobError>>,
-    /// Reason why the network of an epoch could not be shown, until it is reported.
-    failure: Option<JobError>,
     /// When the replay began, in seconds, and at which epoch.
     replay: Option<(f64, usize)>,
 }
@@ -42,7 +42,6 @@ impl ScrubState {
             wanted: None,
             result: None,
             job: Background::prompt("past network", wake),
-            failure: None,
             replay: None,
         }
     }
@@ -50,6 +49,12 @@ impl ScrubState {
     /// Returns the result of the displayed past epoch; `None` while the latest is displayed.
     pub fn result(&self) -> Option<&RunResult> {
         self.result.as_ref().filter(|_| self.wanted.is_some())
+    }
+
+    /// Returns the result of the displayed network of the current training, if it has one.
+    pub(super) fn shown<'a>(&'a self, shared: &'a Shared) -> Option<&'a RunResult> {
+        let latest = shared.result()?;
+        Some(self.result().unwrap_or(latest))
     }
 
     /// Returns the requested epoch; `None` for the latest.
@@ -63,29 +68,17 @@ impl ScrubState {
     }
 
     /// Shows the network of the epoch at or before this one.
-    pub fn show(&mut self, epoch: usize, past: &PastNetworks) {
+    fn show(&mut self, epoch: usize, past: &PastNetworks) {
         let latest = past.epochs().next_back();
         self.wanted = past.nearest(epoch).filter(|epoch| Some(*epoch) != latest);
     }
 
-    /// Shows the latest network again.
-    pub fn show_latest(&mut self) {
+    fn show_latest(&mut self) {
         (self.wanted, self.replay) = (None, None);
     }
 
-    /// Starts a replay at the displayed past epoch, or at the first one; stops a running replay.
-    pub fn toggle_replay(&mut self, now_seconds: f64, past: &PastNetworks) {
-        self.replay = match self.replay {
-            Some(_) => None,
-            None => {
-                let begin = self.wanted.or_else(|| past.epochs().next());
-                begin.map(|epoch| (now_seconds, epoch))
-            }
-        };
-    }
-
-    /// Shows the current epoch of the replay. Early epochs change most, so it advances on a logarithmic scale.
-    pub fn replay(&mut self, now_seconds: f64, past: &PastNetworks) {
+    /// Shows the current epoch of a replay. Early epochs change most, so it advances on a logarithmic scale.
+    fn advance(&mut self, now_seconds: f64, past: &PastNetworks) {
         let (Some((begun, first)), Some(last)) = (self.replay, past.epochs().next_back()) else {
             return;
         };
@@ -99,7 +92,7 @@ impl ScrubState {
     }
 
     /// Leaves an epoch of another training, and computes the results of the requested epoch on the test set.
-    pub fn follow(&mut self, shared: &Shared) {
+    pub fn follow(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         let run = shared.shown_run();
         let id = run.map(|run| run.id);
         if self.of != id {
@@ -114,7 +107,8 @@ impl ScrubState {
                 Ok(None) => self.show_latest(),
                 Err(error) => {
                     self.show_latest();
-                    self.failure = Some(error);
+                    let reason = format!("The network of this epoch cannot be shown: {error}");
+                    effects.push(Effect::Notify(Matter::Training, Notice::Failed(reason)));
                 }
             }
         }
@@ -123,76 +117,46 @@ impl ScrubState {
         };
         // It may have been thinned out meanwhile.
         self.show(wanted, &run.past);
-        let Some(epoch) = self.wanted else { return };
+        let Some((epoch, present)) = self.wanted.zip(run.result.as_ref()) else {
+            return;
+        };
         let is_there = self.result.as_ref().is_some_and(|result| result.epochs_run == epoch);
         if !is_there && !self.job.is_under_way() {
-            self.compute(run, epoch);
+            let (past, present) = (run.past.clone(), present.clone());
+            let (problem, test) = (Arc::clone(&run.problem), run.test.clone());
+            let compute = move |_: &_| result_at(epoch, &past, present, &problem, &test);
+            self.job.start(compute, |computed| computed);
         }
-    }
-
-    /// Returns the reason why the network of an epoch could not be shown, once.
-    pub(super) fn take_failure(&mut self) -> Option<String> {
-        let error = self.failure.take()?;
-        Some(format!("The network of this epoch cannot be shown: {error}"))
-    }
-
-    fn compute(&mut self, run: &RunView, epoch: usize) {
-        let Some(present) = &run.result else { return };
-        let (past, networks, test) = (run.past.clone(), Arc::clone(&present.networks), run.test.clone());
-        let (is_idle, problem) = (present.is_idle, Arc::clone(&run.problem));
-        // The displayed snapshot is decoded too, as in the results of the training itself.
-        let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
-        self.job.start(
-            move |_| {
-                let result = result_at(epoch, &past, &networks, &problem, &test)?;
-                let array = test.array();
-                let recording = test.recording();
-                Some(RunResult {
-                    is_idle,
-                    frame: array.map(|test| (snapshot, test.frame(result.answers.view(), snapshot))),
-                    charts: recording.map(|test| Arc::new(test.charts(&result.answers))),
-                    ..result
-                })
-            },
-            |computed| computed,
-        );
     }
 }
 
+/// Returns the result of the network of an epoch, if it is kept; `present` is that of the same training now.
 fn result_at(
     epoch: usize,
     past: &PastNetworks,
-    present: &Networks,
+    present: RunResult,
     problem: &Problem,
     test: &TestSet,
 ) -> Option<RunResult> {
-    let past = past.at(epoch, present)?;
-    let (networks, best_epoch) = (past.networks, past.best_epoch);
-    let answers = ProgramDecoder::new(networks.decoder_program(problem, None)).answers_to(test.set());
+    let past = past.at(epoch, &present.networks)?;
+    let answers = ProgramDecoder::new(past.networks.decoder_program(problem, None)).answers_to(test.set());
     Some(RunResult {
-        network_alone: None,
         errors: TestErrors::measure(problem, test.set(), &answers),
-        answers: Arc::new(answers),
-        frame: None,
-        charts: None,
+        network_alone: None,
+        charts: test.recording().map(|test| Arc::new(test.charts(&answers))),
         remarks: Vec::new(),
         coverage: Vec::new(),
-        best_epoch,
+        best_epoch: past.best_epoch,
         defect: None,
         epochs_run: epoch,
-        starts_ended: 0,
-        wall_time: None,
-        frame_time: None,
-        is_idle: true,
-        networks: Arc::new(networks),
+        networks: Arc::new(past.networks),
+        answers: Arc::new(answers),
+        ..present
     })
 }
 
 /// Height of the bar, in points.
-pub(in crate::window::views::train) const HEIGHT: f32 = space(8);
-
-/// Time between two frames of a replay.
-const FRAME: Duration = Duration::from_millis(33);
+pub(super) const HEIGHT: f32 = space(8);
 
 /// A slider over the epochs of the training, a button that replays them, and the way back to the latest.
 pub fn scrub_bar_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks) {
@@ -201,22 +165,29 @@ pub fn scrub_bar_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks) {
         return;
     };
     let now_seconds = ui.input(|input| input.time);
+    scrub.advance(now_seconds, past);
     if scrub.is_replaying() {
-        scrub.replay(now_seconds, past);
         ui.ctx().request_repaint_after(FRAME);
     }
     ui.horizontal(|ui| {
         ui.set_min_height(HEIGHT);
-        replay_button_ui(ui, scrub, now_seconds, past);
+        let (text, name) = match scrub.is_replaying() {
+            true => ("⏸", "Stop the replay"),
+            false => ("▶", "Replay the training"),
+        };
+        let button = ui.add(ghost_button(text).min_size(Vec2::splat(space(6))));
+        button.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
+        let hint = "Replays the training: the surfaces, tables and charts of each epoch in turn.";
+        if button.on_hover_text(hint).clicked() {
+            let begin = (now_seconds, scrub.wanted.unwrap_or(epochs[0]));
+            scrub.replay = scrub.replay.is_none().then_some(begin);
+        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let is_past = scrub.epoch().is_some();
             let button = ui.add_enabled(is_past, ghost_button("Latest").min_size(Vec2::new(0.0, space(6))));
-            if button
-                .on_hover_text("Shows the latest network again. Export offers the displayed network and the best.")
-                .clicked()
-            {
+            let hint = "Shows the latest network again. Export offers the displayed network and the best.";
+            if button.on_hover_text(hint).clicked() {
                 scrub.show_latest();
-                ui.request_repaint();
             }
             // As wide as the widest, so that the slider keeps its length.
             let palette = Theme::of(ui).palette;
@@ -234,21 +205,6 @@ pub fn scrub_bar_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks) {
     });
 }
 
-fn replay_button_ui(ui: &mut Ui, scrub: &mut ScrubState, now_seconds: f64, past: &PastNetworks) {
-    let (text, name) = if scrub.is_replaying() {
-        ("⏸", "Stop the replay")
-    } else {
-        ("▶", "Replay the training")
-    };
-    let button = ui.add(ghost_button(text).min_size(Vec2::splat(space(6))));
-    button.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
-    let hint = "Replays the training: the surfaces, tables and histogram of each epoch in turn.";
-    if button.on_hover_text(hint).clicked() {
-        scrub.toggle_replay(now_seconds, past);
-        ui.request_repaint();
-    }
-}
-
 fn epoch_slider_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks, last: usize, epochs: &[usize]) {
     let shown = scrub
         .epoch()
@@ -262,19 +218,13 @@ fn epoch_slider_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks, las
     slider.widget_info(|| WidgetInfo::slider(true, epochs[place.min(last)] as f64, "Epoch of the displayed network"));
     if place != shown {
         // Dragging stops the replay.
-        if scrub.is_replaying() {
-            scrub.toggle_replay(0.0, past);
-        }
+        scrub.replay = None;
         scrub.show(epochs[place.min(last)], past);
-        ui.request_repaint();
     }
-    let hint = match past.stride() {
-        1 => "Shows the network that a training stopped at this epoch would have kept.".to_owned(),
-        stride => format!(
-            "Shows the network that a training stopped at this epoch would have kept. Every {stride}th epoch is \
-             stored, to use no more than {} MB.",
-            PastNetworks::MAX_BYTES >> 20
-        ),
-    };
+    let mut hint = "Shows the network that a training stopped at this epoch would have kept.".to_owned();
+    if past.stride() > 1 {
+        let (stride, megabytes) = (past.stride(), PastNetworks::MAX_BYTES >> 20);
+        hint += &format!(" Every {stride}th epoch is stored, to use no more than {megabytes} MB.");
+    }
     slider.on_hover_text(hint);
 }

@@ -1,152 +1,113 @@
-use std::{path::PathBuf, sync::Arc};
+use std::sync::Arc;
 
 use decoupler_core::{text::counted, training::StopReason};
 use decoupler_files::import::Setup;
-use eframe::egui::{Context, Key, Modifiers, Sense, Ui};
+use eframe::egui::{Sense, Ui};
 use ndarray::Array2;
 
 use super::{
-    charts_card::{BottomTab, charts_card_ui, readings_of_view_ui},
+    charts::{charts_card_ui, readings_of_view_ui},
     configuration::configuration_ui,
-    decoders::{DecoderMeasuring, DecodersState},
-    drawn::{Drawn, Frames},
-    exports::{PaperFigure, checkpoint_task, train_exports},
-    inspect::{Lighting, SectionChoice, TestPlace, drawn_nodes},
+    decoders::Decoders,
+    drawn::Drawn,
+    exports::{PaperFigure, shown},
     press::{PressState, readings_head_ui},
-    recording::{RecordingEditor, recipe_export},
-    report::{self, report_ui},
+    recording::{RecordingEditor, recipe_task},
+    report,
     scrub::ScrubState,
+    section::SectionChoice,
     surfaces::surfaces_ui,
 };
 use crate::window::{
     job::Wake,
     shared::{
-        Columns, Effect, Export, FileInUse, Look, Matter, Notice, Offers, Phase, RightCard, RunCommand, RunResult,
-        RunView, Shared, SourceKind, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, Look, MIN_WIDTH_FOR_REPORT, Offers, Phase, RightCard, RunResult, RunView, Shared,
+        Shown, SourceKind, Status, Unfinished, View, run_buttons_ui,
     },
-    test_view::RecordedTest,
+    test_view::{Drawing, RecordedTest},
     theme::space,
     widgets::{card_ui, snapshot_ui},
 };
 
 impl View for TrainView {
-    fn name(&self) -> &'static str {
-        "Train"
-    }
-
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
-        self.measuring.follow(shared, &mut self.decoders);
-        let failure = self.scrub.take_failure();
-        effects.extend(failure.map(|reason| Effect::Notify(Matter::Training, Notice::Failed(reason))));
+        self.decoders.follow(shared);
+        self.scrub.follow(shared, effects);
     }
 
-    fn take_files(&mut self, paths: &[PathBuf], shared: &Shared, effects: &mut Vec<Effect>) -> bool {
-        if shared.phase.is_busy() {
-            let text = "A training is running: stop it before you open other files.";
-            effects.push(Effect::Notify(Matter::Recording, Notice::Failed(text.to_owned())));
-        } else {
-            self.recording.open(paths.to_vec());
-        }
-        true
-    }
-
-    fn files_in_use(&self) -> Vec<FileInUse> {
-        self.recording.files_in_use()
-    }
-
-    fn unfinished(&self, shared: &Shared) -> Vec<Unfinished> {
-        let mut unfinished = Vec::from_iter(unfinished_training(shared));
-        if self.decoders.is_measuring() {
+    fn holdings(&self, _shared: &Shared) -> Holdings {
+        let unfinished = self.decoders.is_measuring().then(|| {
             let results = self.decoders.measured.as_deref().unwrap_or_default();
             let measured = results.iter().filter(|result| result.report.is_some()).count();
             let progress = format!("{measured} of {} measured", counted(results.len(), "decoder"));
-            unfinished.push(Unfinished::discarded("More decoders", progress));
+            Unfinished::new("More decoders", progress)
+        });
+        Holdings {
+            is_computing: false,
+            unfinished: Vec::from_iter(unfinished),
+            files: self.recording.files_in_use(),
         }
-        unfinished
     }
 
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.is_heard {
+            let lit = self.lights.node;
+            let lit = lit.and_then(|node| self.drawing()?.actual.nodes.get(node).copied());
+            self.press.take_pointer(offers.ctx, shared.test(), lit);
+            self.follow(shared);
+        }
         let phase = shared.phase;
-        let is_idle = !phase.is_busy() && phase != Phase::Died;
-        if offers.offer_keys("Train", Modifiers::COMMAND, Key::Enter, is_idle) {
-            effects.push(Effect::Train);
-        }
-        if offers.offer("Continue training", shared.can_continue()) {
-            effects.push(Effect::Continue);
-        }
-        let (name, effect) = if phase == Phase::Paused {
-            ("Resume training", Effect::Resume)
-        } else {
-            ("Pause training", Effect::Pause)
+        let (pause, paused) = match phase {
+            Phase::Paused => (Command::ResumeTraining, Effect::Resume),
+            _ => (Command::PauseTraining, Effect::Pause),
         };
         let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-        if offers.offer_keys(name, Modifiers::COMMAND, Key::P, can_pause) {
-            effects.push(effect);
+        for (command, is_possible, effect) in [
+            (Command::Train, !phase.is_busy(), Effect::Train),
+            (Command::TrainLonger, shared.can_continue(), Effect::Continue),
+            (pause, can_pause, paused),
+            (Command::StopTraining, phase.is_busy(), Effect::Stop),
+        ] {
+            if offers.offer(command, is_possible) {
+                effects.push(effect);
+            }
         }
-        if offers.offer_keys("Stop training", Modifiers::COMMAND, Key::Period, phase.is_busy()) {
-            effects.push(Effect::Stop);
-        }
-        if offers.offer("Open files", !phase.is_busy()) {
+        if offers.offer(Command::OpenFiles, !phase.is_busy()) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
         if shared.source == SourceKind::Array
-            && offers.offer("Press the middle of the surface", shared.test().is_some())
+            && offers.offer(Command::PressMiddle, shared.test().is_some())
             && let Some(test) = shared.test()
         {
             self.press.press_middle(test);
         }
-        let what = snapshot_word(shared.source);
         let has_next = self.snapshot + 1 < Self::snapshots(shared);
-        if offers.offer_keys(format!("Next test {what}"), Modifiers::NONE, Key::PageDown, has_next) {
+        if offers.offer(Command::NextSample, has_next) {
             self.show_snapshot(self.snapshot + 1);
         }
-        let name = format!("Previous test {what}");
-        if offers.offer_keys(name, Modifiers::NONE, Key::PageUp, self.snapshot > 0) {
+        if offers.offer(Command::PreviousSample, self.snapshot > 0) {
             self.show_snapshot(self.snapshot - 1);
         }
         self.offer_charts(offers, shared);
     }
 
-    fn take_pointer(&mut self, ctx: &Context, shared: &Shared) {
-        let frames = self.frames().clone();
-        self.press.take_pointer(ctx, shared.test(), &frames, self.lights.node);
-        self.follow(shared);
-    }
-
-    fn columns(&self, window_width: f32) -> Columns {
-        let has_report = WorkbenchLayout::of_width(window_width) == WorkbenchLayout::ReportBeside;
-        Columns {
-            form_width: if has_report { space(68) } else { space(62) },
-            has_report,
-        }
-    }
-
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let can_train = shared.phase != Phase::Died;
-        let hint = match shared.source {
-            SourceKind::Array => "draws the sets and trains the network",
-            SourceKind::Recording => "reads the recording and trains the network",
-        };
-        let command = run_buttons_ui(ui, shared.phase, (can_train, shared.can_continue()), hint);
-        effects.extend(command.map(|command| match command {
-            RunCommand::Train => Effect::Train,
-            RunCommand::Continue => Effect::Continue,
-            RunCommand::Pause => Effect::Pause,
-            RunCommand::Resume => Effect::Resume,
-            RunCommand::Stop => Effect::Stop,
-        }));
+        run_buttons_ui(ui, shared, effects);
         ui.add_space(space(4));
-        let what = snapshot_word(shared.source);
+        let what = match shared.source {
+            SourceKind::Array => "snapshot",
+            SourceKind::Recording => "sample",
+        };
         if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, Self::snapshots(shared)) {
             self.show_snapshot(snapshot);
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        let mut exports = train_exports(self, shared);
-        exports.push(recipe_export(shared));
-        exports
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        let mut shown = shown(self, shared);
+        shown.push(Shown::file("Recipe", recipe_task(shared)));
+        shown
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -160,114 +121,24 @@ impl View for TrainView {
         report::report_ui(ui, self, shared, effects);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         if self.recording.is_on_show(shared) {
-            return self.recording.columns_ui(ui, shared, effects);
+            self.recording.columns_ui(ui, shared, effects);
+            return None;
         }
         self.follow(shared);
-        if self.watched != self.snapshot {
-            self.watched = self.snapshot;
-            effects.push(Effect::Watch(self.snapshot));
-        }
-        workbench_ui(ui, self, shared, effects);
+        self.workbench_ui(ui, shared, effects);
+        None
     }
 }
 
-/// Returns the word for an item of the test set.
-fn snapshot_word(source: SourceKind) -> &'static str {
-    match source {
-        SourceKind::Array => "snapshot",
-        SourceKind::Recording => "sample",
-    }
-}
-
-/// Returns the training if it is being prepared or has unsaved epochs.
-fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
-    let training = |progress, saving| Unfinished {
-        work: "Training",
-        progress,
-        saving,
-        is_kept: shared.runs.path.is_some(),
-    };
-    let run = shared.run.as_ref();
-    match shared.phase {
-        Phase::Preparing => {
-            let progress = match shared.source {
-                SourceKind::Array => "its samples are being drawn",
-                SourceKind::Recording => "its files are being read",
-            };
-            Some(training(progress.to_owned(), None))
-        }
-        Phase::Training | Phase::Paused | Phase::Calibrating => {
-            let run = run.filter(|run| !run.is_saved)?;
-            let epochs = run.settings().training.stopping.epochs;
-            let epoch = run.latest().map_or(0, |latest| latest.epoch);
-            Some(training(
-                format!("epoch {epoch} of {epochs}"),
-                Some(checkpoint_task(run)),
-            ))
-        }
-        Phase::Idle | Phase::Ended(_) | Phase::Died => None,
-    }
-}
-
-/// Position of the report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WorkbenchLayout {
-    /// In its own column, right of the workbench.
-    ReportBeside,
-    /// On a card below the surfaces, next to the charts, so that the surfaces keep their width in narrow windows.
-    ReportBelow,
-}
-
-impl WorkbenchLayout {
-    /// Returns the position in a window of this width in points.
-    pub fn of_width(width: f32) -> Self {
-        /// Window width from which a column next to the surfaces leaves them enough room.
-        const MIN_FOR_COLUMN: f32 = 1400.0;
-        if width < MIN_FOR_COLUMN {
-            Self::ReportBelow
-        } else {
-            Self::ReportBeside
-        }
-    }
-}
-
-/// The middle of the window: both surfaces above, the charts below, and next to them the readings of an array.
-pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let layout = WorkbenchLayout::of_width(ui.ctx().content_rect().width());
-    let whole = ui.available_rect_before_wrap();
-    let gap = space(2);
-    let (share, least) = match layout {
-        WorkbenchLayout::ReportBeside => (0.32, space(40)),
-        WorkbenchLayout::ReportBelow => (0.42, space(54)),
-    };
-    let lower_height = (share * whole.height()).clamp(least, space(75));
-    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-    surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), view, shared, effects);
-    let has_sensor = shared.source == SourceKind::Array;
-    let (charts, has_readings) = match layout {
-        WorkbenchLayout::ReportBeside if !has_sensor => (lower, false),
-        WorkbenchLayout::ReportBeside => {
-            let width = (0.4 * lower.width()).floor();
-            let (charts, readings) = lower.split_left_right_at_x(lower.right() - width);
-            card_ui(ui, readings, |ui| {
-                readings_head_ui(ui, view.drops_percent());
-                readings_of_view_ui(ui, view, shared);
-            });
-            (charts.with_max_x(charts.max.x - gap), false)
-        }
-        WorkbenchLayout::ReportBelow => {
-            let width = (0.45 * lower.width()).clamp(space(82), space(96));
-            let (charts, report) = lower.split_left_right_at_x(lower.right() - width);
-            card_ui(ui, report, |ui| report_ui(ui, view, shared, effects));
-            (charts.with_max_x(charts.max.x - gap), has_sensor)
-        }
-    };
-    card_ui(ui, charts, |ui| {
-        charts_card_ui(ui, view, shared, has_readings, effects);
-    });
-    ui.allocate_rect(whole, Sense::hover());
+/// The item under the pointer in one of the pictures, which lights up in all of them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Lighting {
+    /// A node, by its number among those drawn; a target of a recording.
+    pub node: Option<usize>,
+    /// A row-wire, by its place among those read: a reading is that of all its nodes.
+    pub row: Option<usize>,
 }
 
 /// The Train view.
@@ -277,17 +148,15 @@ pub struct TrainView {
     pub snapshot: usize,
     /// Target of a recording whose values the charts show.
     pub(super) target: usize,
-    /// Snapshot last sent to the worker.
-    pub(super) watched: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
-    /// The chart below.
-    pub tab: BottomTab,
+    /// Name of the chart below.
+    pub tab: &'static str,
     /// Item lit by the pointer, in every picture.
     pub lights: Lighting,
     /// The wire along which the surfaces are cut.
     pub section: SectionChoice,
-    /// True if each decoupled node has an error bar of its root mean square error.
+    /// True if each decoded node has an error bar of its root mean square error.
     pub has_error_bars: bool,
     /// Drawings of the test set.
     pub drawn: Drawn,
@@ -298,8 +167,7 @@ pub struct TrainView {
     /// Editor of the recording that is trained on.
     pub(in crate::window) recording: RecordingEditor,
     /// Results of other decoders on the test set.
-    pub decoders: DecodersState,
-    pub(super) measuring: DecoderMeasuring,
+    pub decoders: Decoders,
 }
 
 impl TrainView {
@@ -308,9 +176,8 @@ impl TrainView {
         Self {
             snapshot: 0,
             target: 0,
-            watched: 0,
             right: RightCard::default(),
-            tab: BottomTab::default(),
+            tab: "Loss",
             lights: Lighting::default(),
             section: SectionChoice::default(),
             has_error_bars: false,
@@ -318,30 +185,66 @@ impl TrainView {
             press: PressState::new(&wake),
             scrub: ScrubState::new(Arc::clone(&wake)),
             recording: RecordingEditor::new(&wake),
-            decoders: DecodersState::default(),
-            measuring: DecoderMeasuring::new(wake),
+            decoders: Decoders::new(wake),
         }
     }
 
+    /// Shows both surfaces above, the charts below, and next to them the readings of an array. In a narrow window, the report
+    /// takes the place of the readings, so that the surfaces keep their width.
+    fn workbench_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        let is_narrow = ui.ctx().content_rect().width() < MIN_WIDTH_FOR_REPORT;
+        let whole = ui.available_rect_before_wrap();
+        let gap = space(2);
+        let (share, least) = if is_narrow {
+            (0.42, space(54))
+        } else {
+            (0.32, space(40))
+        };
+        let lower_height = (share * whole.height()).clamp(least, space(75));
+        let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+        surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), self, shared, effects);
+        let has_sensor = shared.source == SourceKind::Array;
+        let width = match is_narrow {
+            true => (0.45 * lower.width()).clamp(space(82), space(96)),
+            false => (0.4 * lower.width()).floor(),
+        };
+        let (mut charts, beside) = lower.split_left_right_at_x(lower.right() - width);
+        charts.max.x -= gap;
+        if is_narrow {
+            card_ui(ui, beside, |ui| report::report_ui(ui, self, shared, effects));
+        } else if has_sensor {
+            card_ui(ui, beside, |ui| {
+                readings_head_ui(ui, self.drops_percent());
+                readings_of_view_ui(ui, self, shared);
+            });
+        } else {
+            charts = lower;
+        }
+        let has_readings = is_narrow && has_sensor;
+        card_ui(ui, charts, |ui| charts_card_ui(ui, self, shared, has_readings, effects));
+        ui.allocate_rect(whole, Sense::hover());
+    }
+
     /// Draws what is displayed.
-    pub(super) fn follow(&mut self, shared: &Shared) {
-        self.scrub.follow(shared);
-        let result = result_of(&self.scrub, shared);
+    fn follow(&mut self, shared: &Shared) {
+        let result = self.scrub.shown(shared);
         let target = shared.recorded_test().map_or(0, |test| self.target_of(test));
         self.snapshot = self.drawn.follow(shared, result, self.snapshot, target);
         self.press.follow(shared, result);
-        let nodes = drawn_nodes(shared, self.frames().actual.nodes_mm.len());
-        self.lights.node = self.lights.node.filter(|&node| node < nodes);
+        let of_recording = shared.recorded_test().map(|test| test.set.outputs());
+        let items = of_recording.unwrap_or(self.drawing().map_or(0, |drawing| drawing.actual.nodes.len()));
+        self.lights.node = self.lights.node.filter(|&item| item < items);
     }
 
     /// Returns the current result: that of the training so far, or of the displayed past epoch.
     pub fn result<'a>(&'a self, shared: &'a Shared) -> Option<&'a RunResult> {
-        result_of(&self.scrub, shared)
+        self.scrub.shown(shared)
     }
 
     /// Returns the displayed surfaces: those under the finger, or those of the test set.
-    pub fn frames(&self) -> &Frames {
-        self.press.frames().unwrap_or(&self.drawn.frames)
+    pub fn drawing(&self) -> Option<&Drawing> {
+        let pressed = self.press.shown().map(|shown| &shown.drawing);
+        pressed.or(self.drawn.surfaces.as_ref())
     }
 
     /// Returns the drops of the readings of the displayed surface from those at rest, in percent: rows read × M4.
@@ -353,13 +256,19 @@ impl TrainView {
     }
 
     /// Goes to a snapshot of the test set.
-    pub(super) fn show_snapshot(&mut self, snapshot: usize) {
+    fn show_snapshot(&mut self, snapshot: usize) {
         self.snapshot = snapshot;
         self.press.let_go();
     }
 
+    /// Goes to a snapshot of the test set and marks one of its nodes, or a target of a recording.
+    pub(super) fn go_to(&mut self, snapshot: usize, node: Option<usize>) {
+        self.show_snapshot(snapshot);
+        self.lights.node = node;
+    }
+
     /// Returns the number of snapshots of the current test set: frames of an array, samples of a recording.
-    pub(super) fn snapshots(shared: &Shared) -> usize {
+    fn snapshots(shared: &Shared) -> usize {
         let of_recording = || shared.recorded_test().map(|test| test.set.samples());
         let of_array = shared.test().map(|test| test.snapshots.len());
         of_array.or_else(of_recording).unwrap_or(0)
@@ -370,24 +279,13 @@ impl TrainView {
         self.target.min(test.set.outputs().saturating_sub(1))
     }
 
-    /// Returns the root mean square error of each node, where error bars are on and there is a result.
-    pub fn error_bars_mm(&self) -> Option<&[f64]> {
-        self.has_error_bars.then(|| self.drawn.spread_mm()).flatten()
-    }
-
-    /// Goes to this value of the test set and marks its node.
-    pub(super) fn go_to(&mut self, place: TestPlace) {
-        self.show_snapshot(place.snapshot);
-        self.lights.node = place.node;
-    }
-
     /// Displays a figure of the paper, and trains its network unless that is the current one.
-    pub(super) fn show_paper_figure(&mut self, figure: PaperFigure, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn show_paper_figure(&mut self, figure: PaperFigure, shared: &Shared, effects: &mut Vec<Effect>) {
         let settings = figure.settings();
         effects.push(Effect::Configure(Box::new(settings)));
         self.right = RightCard::Decoupled;
-        self.tab = figure.tab().unwrap_or(self.tab);
-        if let Some(mode) = figure.mode() {
+        self.tab = figure.chart.unwrap_or(self.tab);
+        if let Some(mode) = figure.mode {
             effects.push(Effect::Look(Look { mode, ..shared.look }));
         }
         let is_complete = |run: &RunView| {
@@ -398,9 +296,4 @@ impl TrainView {
             effects.push(Effect::Train);
         }
     }
-}
-
-fn result_of<'a>(scrub: &'a ScrubState, shared: &'a Shared) -> Option<&'a RunResult> {
-    let latest = shared.result()?;
-    Some(scrub.result().unwrap_or(latest))
 }

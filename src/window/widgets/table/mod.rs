@@ -2,23 +2,24 @@
 //!
 //! A short table ([`TableView::show_all`]) is as high as its rows. A table of any number of rows ([`TableView::show`]) fills
 //! the available space and scrolls under its header; only visible rows are created and laid out. If the columns are too wide,
-//! the font becomes smaller; if that is not enough, the table scrolls sideways and its first column stays visible.
+//! the font becomes smaller; if that is not enough, the table scrolls sideways.
 
 mod row;
 mod show;
+#[cfg(test)]
+mod tests;
 
-use crate::window::theme::space;
 use decoupler_files::export;
+use eframe::egui::Ui;
 
 pub use row::{SortBy, TableCell, TableRow};
 
-/// Height of a row of text.
-const ROW_HEIGHT: f32 = space(6);
+use crate::window::theme::space;
 
 /// Width of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColumnWidth<'a> {
-    /// As wide as the widest of its cells; for short tables, since it is measured on the first [`row::MEASURED_ROWS`].
+    /// As wide as the widest of its cells; for short tables, since it is measured on the first hundred rows.
     Content,
     /// As wide as this text, which must be the longest of its cells.
     Fits(&'a str),
@@ -84,8 +85,6 @@ pub enum TableClick {
     Select(usize),
     /// Row with this index opened by a double click.
     Open(usize),
-    /// Pointer over the row with this index.
-    Point(usize),
 }
 
 /// Table widget.
@@ -107,7 +106,7 @@ impl<'a> TableView<'a> {
             columns,
             sort: None,
             is_clickable: false,
-            row_height: ROW_HEIGHT,
+            row_height: space(6),
         }
     }
 
@@ -134,17 +133,12 @@ impl<'a> TableView<'a> {
 }
 
 /// Shows the table described by `table` over the available width.
-pub fn described_table_ui(ui: &mut eframe::egui::Ui, id: &str, table: &export::Table) {
-    let titles: Vec<String> = table.columns.iter().map(export::TableColumn::title).collect();
+pub fn described_table_ui(ui: &mut Ui, id: &str, table: &export::Table) {
+    let titles = Vec::from_iter(table.columns.iter().map(export::TableColumn::title));
     let described = table.columns.iter().zip(&titles).enumerate();
-    let columns: Vec<TableColumn<'_>> = described
-        .map(|(place, (column, title))| match place {
-            0 => TableColumn::text(title).meaning(column.meaning),
-            _ => TableColumn::figure(title).meaning(column.meaning),
-        })
-        .collect();
-    TableView::new(id, &columns).show_all(ui, TableRow::of_table(table));
+    let columns = described.map(|(place, (column, title))| match place {
+        0 => TableColumn::text(title).meaning(column.meaning),
+        _ => TableColumn::figure(title).meaning(column.meaning),
+    });
+    TableView::new(id, &Vec::from_iter(columns)).show_all(ui, TableRow::of_table(table));
 }
-
-#[cfg(test)]
-mod tests;

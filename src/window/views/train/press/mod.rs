@@ -1,18 +1,220 @@
 //! Pressing: the user's finger on the actual surface, and the answers of all decoders.
 //!
-//! `state` holds the finger and its [`Touch`], and has the touch answered in the same frame,
-//! or in the background for large arrays. `pointer` turns mouse and keys into a touch before anything of the frame is
-//! drawn, and trains a small network (`ready_settings`) that answers until there is another. `comparing` asks the other
-//! decoders in the background. `pressed` is the touched sensor with its readings. `section` computes and shows the answers.
+//! `pointer` turns mouse and keys into a [`Touch`] before anything of the frame is drawn. `solving` computes what is shown of
+//! it in the background, the newest first; `decoders` asks the other decoders, and trains a small network that answers until
+//! there is another. `section` shows the answers.
 
-mod comparing;
+mod decoders;
 mod pointer;
-mod pressed;
-mod ready_settings;
 mod section;
-mod state;
-mod touch;
+mod solving;
 
-pub use section::{Shown, press_section_ui, readings_head_ui, readings_ui};
-pub use state::{Hand, PressState};
-pub use touch::Touch;
+use std::sync::Arc;
+
+use decoupler_core::scene::{Indenter, IndenterShape, Radii};
+use decoupler_files::figure::surface::{Sight, Surface};
+use eframe::egui::{Id, Rect};
+use glam::DVec2;
+
+use self::{
+    decoders::{Comparison, Demo},
+    solving::{Question, Subject, solve},
+};
+use crate::window::{
+    job::{Background, JobError, Wake},
+    shared::{RunResult, Shared},
+    surface_view::SurfaceViewResponse,
+    test_view::TestView,
+};
+
+pub use section::{press_section_ui, readings_head_ui, readings_ui};
+pub use solving::Shown;
+
+/// The finger, what it presses, and everything known about that.
+#[derive(Debug)]
+pub struct PressState {
+    /// Work of the pointer on the actual surface.
+    pub hand: Hand,
+    /// The finger that presses.
+    pub finger: Finger,
+    /// Place that it presses; `None` while the test set is displayed.
+    place_mm: Option<DVec2>,
+    /// Height of the plane in which the pointer moves it, while the button is down: that of the first contact, so that it
+    /// does not jump as the surface gives way.
+    grip_mm: Option<f64>,
+    /// The actual surface as last drawn.
+    target: Option<Target>,
+    /// The latest answer, or why there is none, with its question.
+    answered: Option<Answered>,
+    solving: Background<Result<Answered, JobError>>,
+    comparison: Comparison,
+    demo: Demo,
+}
+
+/// A question with its answer, or why there is none.
+type Answered = (Question, Result<Shown, String>);
+
+impl PressState {
+    /// Nothing pressed. `wake` is called when something was computed in the background.
+    pub fn new(wake: &Wake) -> Self {
+        Self {
+            hand: Hand::default(),
+            finger: Finger::default(),
+            place_mm: None,
+            grip_mm: None,
+            target: None,
+            answered: None,
+            solving: Background::prompt("press", Arc::clone(wake)),
+            comparison: Comparison::new(wake),
+            demo: Demo::new(wake),
+        }
+    }
+
+    /// Returns true while something is pressed.
+    pub fn is_pressing(&self) -> bool {
+        self.place_mm.is_some()
+    }
+
+    /// What is shown of the touch; `None` while the test set is displayed, or before the first answer.
+    pub fn shown(&self) -> Option<&Shown> {
+        self.answered.as_ref()?.1.as_ref().ok()
+    }
+
+    /// Goes back to the test set.
+    pub fn let_go(&mut self) {
+        (self.place_mm, self.grip_mm, self.answered) = (None, None, None);
+        self.solving.abandon();
+    }
+
+    /// Presses the middle of the nodes.
+    pub fn press_middle(&mut self, test: &TestView) {
+        let (geometry, scale) = (&test.sensor.geometry, test.sensor.scale);
+        let [first, last] = [test.rows.first(), test.rows.last()].map(|row| row.copied().unwrap_or(0));
+        let first = geometry.row_node_mm(scale, first, 0);
+        let last = geometry.row_node_mm(scale, last, scale.nodes_per_row() - 1);
+        self.place_mm = Some(0.5 * (first + last).truncate());
+    }
+
+    /// Takes the actual surface as it was drawn.
+    pub fn take_target(&mut self, drawn: &SurfaceViewResponse, surface: &Surface) {
+        self.target = drawn.sight.map(|sight| Target {
+            id: drawn.response.id,
+            rect: drawn.response.rect,
+            sight,
+            surface: surface.clone(),
+        });
+    }
+
+    /// Has the touch answered, one question at a time; `result` is that of the displayed network.
+    pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
+        let Some(test) = shared.test() else {
+            // A recording has no sensor model to press.
+            self.let_go();
+            self.target = None;
+            return;
+        };
+        if self
+            .answered
+            .as_ref()
+            .is_some_and(|(question, _)| !question.is_of(test))
+        {
+            // Another array, or another scene.
+            self.let_go();
+        }
+        let Some(place_mm) = self.place_mm else { return };
+        let own = shared.shown_run().zip(result).map(|(run, result)| Subject {
+            networks: Arc::clone(&result.networks),
+            settings: *run.settings(),
+            is_demo: false,
+            is_idle: result.is_idle,
+        });
+        if own.is_none() {
+            self.demo.follow(test);
+        }
+        let question = Question {
+            finger: self.finger,
+            place_mm,
+            test: test.clone(),
+            subject: own.or_else(|| self.demo.subject.clone()?.ok()),
+        };
+        while let Some(answered) = self.solving.next_event() {
+            let failed = |error: JobError| (question.clone(), Err(error.to_string()));
+            self.answered = Some(answered.unwrap_or_else(failed));
+        }
+        let is_answered = self
+            .answered
+            .as_ref()
+            .is_some_and(|(answered, _)| answered.is(&question));
+        if !is_answered && !self.solving.is_under_way() {
+            self.solving.start(move |_| solve(question), |answered| answered);
+        }
+        if let Some((question, Ok(shown))) = &self.answered {
+            self.comparison.follow(question, &shown.pressed);
+        }
+    }
+
+    /// Text while something is pressed and no network has answered.
+    pub fn waiting_text(&self, shared: &Shared) -> &str {
+        match &self.demo.subject {
+            Some(Err(reason)) => reason,
+            _ if self.demo.is_awaited() => "The built-in demo network is being trained…",
+            _ if shared.phase.is_busy() => "The network answers here once its training has begun.",
+            _ => "This array is too large for the demo network: press Train, and your network answers here.",
+        }
+    }
+}
+
+/// A surface on the screen that can be touched.
+#[derive(Clone, Debug)]
+struct Target {
+    id: Id,
+    rect: Rect,
+    sight: Sight,
+    surface: Surface,
+}
+
+/// Work of the pointer on the actual surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Hand {
+    /// It presses.
+    #[default]
+    Press,
+    /// It turns the surface.
+    Turn,
+}
+
+/// The ball that presses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finger {
+    /// Its radius.
+    pub radius_mm: f64,
+    /// Its depth as a part of the stroke, from 0 to 1.
+    pub depth_share: f64,
+}
+
+impl Default for Finger {
+    fn default() -> Self {
+        Self {
+            radius_mm: 4.0,
+            depth_share: 0.8,
+        }
+    }
+}
+
+impl Finger {
+    fn indenter(&self) -> Indenter {
+        let radius_mm = Radii {
+            smallest: self.radius_mm,
+            largest: self.radius_mm,
+        };
+        Indenter {
+            shape: IndenterShape::Sphere { radius_mm },
+            ..Indenter::default()
+        }
+    }
+
+    /// Presses deeper by a part of the stroke.
+    fn deepen(&mut self, share: f64) {
+        self.depth_share = (self.depth_share + share).clamp(0.0, 1.0);
+    }
+}

@@ -1,24 +1,18 @@
-//! The files of a recording, including files that have moved or changed since a run was saved.
+//! The files of a recording in the form, including those that are missing or have changed since a run was saved.
 
-use std::{
-    fs,
-    ops::ControlFlow,
-    path::{Path, PathBuf},
-};
+use std::path::PathBuf;
 
 use decoupler_core::text::counted;
-use decoupler_files::{
-    export::{CheckpointFile, RecipeFile, atomic_write},
-    import::{FileChecksum, Plan, Recorded, file_crc32},
-};
+use decoupler_files::export::RecipeFile;
 use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
-    draft::{Draft, file_name},
-    editor::RecordingEditor,
+    editor::{RecordingEditor, Use},
+    import::{Import, file_name},
+    reading::State,
 };
 use crate::window::{
-    shared::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Shared, file_stem, sentence},
+    shared::{Effect, FileTask, FileWords, Shared, file_stem, sentence},
     widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
 };
 
@@ -42,38 +36,23 @@ pub(super) const FILES: FileWords = FileWords {
     ],
 };
 
-/// An open file by its use.
-#[derive(Clone)]
-enum OpenFile {
-    /// A recording by its number: the first, or one that is joined to it.
-    Recording(usize),
-    /// A file whose rows follow those of the first, by its number.
-    Appended(usize),
-    /// A file for the test, by the recording that it replaces.
-    Test(PathBuf),
-    /// Positions of targets.
-    Positions,
-}
+/// Closes an open file by its number among the files of the same use.
+type Close = fn(&mut RecordingEditor, usize);
 
 impl RecordingEditor {
-    /// Returns the task of opening a file.
-    pub fn open_task(&self) -> FileTask {
-        self.recordings.task(FILES, String::new())
-    }
-
     /// Shows the files of the recording, and opens and closes them.
     pub fn files_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         section_heading_ui(ui, "Files");
         self.missing_ui(ui, effects);
-        if let Some(file) = self.draft.as_ref().and_then(|draft| open_files_ui(ui, draft)) {
-            self.close_file(file);
+        if let Some((close, number)) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
+            close(self, number);
         }
         for name in &self.changed {
             note_ui(ui, &format!("{name} has changed since the run was saved."));
         }
         self.samples_line_ui(ui);
-        if let Some((name, progress)) = &self.opening.under_way {
-            dim_ui(ui, &format!("Reading {name}…"));
+        if let State::Opening { names, progress, .. } = &self.reading.state {
+            dim_ui(ui, &format!("Reading {names}…"));
             let share = progress.and_then(|progress| Some(progress.bytes as f32 / progress.of?.max(1) as f32));
             if let Some(share) = share {
                 progress_bar_ui(ui, "Reading", share, &format!("{:.0} %", 100.0 * share));
@@ -92,75 +71,47 @@ impl RecordingEditor {
         }
     }
 
-    /// Lists the missing files, each with buttons to find it.
+    /// Lists the missing files, each with a button to find it.
     fn missing_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
         let Some(reopened) = &self.missing else { return };
-        let missing: Vec<PathBuf> = reopened.missing().into_iter().map(PathBuf::from).collect();
         let is_training = reopened.checkpoint.is_some();
-        for path in missing {
+        for path in reopened.missing.clone() {
             let name = file_name(&path);
             note_ui(ui, &format!("{name} is missing.")).on_hover_text(path.display().to_string());
-            ui.horizontal(|ui| {
-                let find = ui.add(ghost_button("Find…"));
-                find.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Find {name}")));
-                let find = find.on_hover_text("Choose the file in its new place. Its contents are checked.");
-                let typed = ui.add(ghost_button("Type path…"));
-                typed.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Type the path of {name}")));
-                if !find.clicked() && !typed.clicked() {
-                    return;
-                }
-                let (_, paths) = self
-                    .finding
-                    .insert((path.clone(), super::editor::ChosenPaths::default()));
-                let task = paths.task(FILES, name.clone());
-                effects.push(if find.clicked() {
-                    Effect::ChooseFile(task)
-                } else {
-                    Effect::TypePath(task)
-                });
-            });
+            let find = ui.add(ghost_button("Find…"));
+            find.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Find {name}")));
+            let find = find.on_hover_text("Choose the file in its new place. Its contents are checked.");
+            if find.clicked() {
+                effects.push(Effect::ChooseFile(self.ask(Use::Missing(path), FILES, name)));
+            }
         }
         if is_training {
             dim_ui(ui, "The training is resumed once its recording is found.");
         }
     }
 
-    fn close_file(&mut self, file: OpenFile) {
-        match (file, &mut self.draft) {
-            (OpenFile::Recording(number), _) => self.close(number),
-            (OpenFile::Appended(number), Some(draft)) => draft.close_appended(number),
-            (OpenFile::Test(recording), Some(draft)) => draft.close_test_file(&recording),
-            (OpenFile::Positions, Some(draft)) => draft.plan.import.positions = None,
-            (_, None) => {}
-        }
-    }
-
     /// Shows the numbers of channels and samples, or the error of the import.
     fn samples_line_ui(&self, ui: &mut Ui) {
-        let Some(draft) = &self.draft else { return };
-        if let Some(reason) = draft.obstacle() {
-            note_ui(ui, &sentence(&reason));
+        if self.import.is_none() {
             return;
         }
-        let channels = self.channels().map(|(inputs, targets)| {
-            let inputs = counted(inputs, "input");
-            format!("{inputs}, {}", counted(targets, "target"))
-        });
-        let samples = match &self.checking.checked {
-            Some(Ok(checked)) => counted(checked.samples.iter().sum::<usize>(), "sample"),
-            Some(Err(reason)) => {
-                note_ui(ui, &sentence(reason));
-                return;
+        let (inputs, targets) = self.channels().unwrap_or_default();
+        let channels = format!("{}, {}", counted(inputs, "input"), counted(targets, "target"));
+        match (self.obstacle(), &self.reading.state) {
+            (Some(reason), _) => drop(note_ui(ui, &sentence(&reason))),
+            (None, State::Checked(Err(reason))) => drop(note_ui(ui, &sentence(reason))),
+            (None, State::Checked(Ok(checked))) => {
+                let samples = counted(checked.samples.iter().sum::<usize>(), "sample");
+                dim_ui(ui, &format!("{channels}, {samples}"));
             }
-            None if self.checking.is_under_way() => "checking the import…".to_owned(),
-            None => return,
-        };
-        dim_ui(ui, &format!("{}, {samples}", channels.unwrap_or_default()));
+            (None, State::Checking) => drop(dim_ui(ui, &format!("{channels}, checking the import…"))),
+            (None, _) => {}
+        }
     }
 
     fn buttons_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
         ui.horizontal_wrapped(|ui| {
-            let text = if self.draft.is_some() {
+            let text = if self.import.is_some() {
                 "Add file…"
             } else {
                 "Open file…"
@@ -168,15 +119,9 @@ impl RecordingEditor {
             if ui.add(ghost_button(text)).on_hover_text(FILES.description).clicked() {
                 effects.push(Effect::ChooseFile(self.open_task()));
             }
-            let typed = ui.add(ghost_button("Type path…"));
-            typed.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Type the path of a recording"));
-            let typed = typed.on_hover_text("Type the path instead of choosing the file.");
-            if typed.clicked() {
-                effects.push(Effect::TypePath(self.open_task()));
-            }
-            if self.opening.under_way.is_some() {
+            if self.reading.is_opening() {
                 if ui.add(ghost_button("Cancel")).clicked() {
-                    self.opening.cancel();
+                    self.reading.cancel();
                 }
             } else if !self.is_empty() {
                 let clear = ui.add(ghost_button("Clear"));
@@ -187,48 +132,59 @@ impl RecordingEditor {
         });
     }
 
-    /// Shows the button that displays the columns in place of the results.
+    /// Shows the button that displays the columns in place of the results, or the results again.
     pub fn columns_button_ui(&mut self, ui: &mut Ui, shared: &Shared) {
-        if self.draft.is_some() && !self.is_on_show(shared) {
-            let button = ui.add(ghost_button("Columns…"));
-            let hint = "Shows the columns of the files and their meanings in place of the results.";
-            if button.on_hover_text(hint).clicked() {
-                self.shows_columns = true;
-                ui.request_repaint();
-            }
+        let is_on_show = self.is_on_show(shared);
+        if self.import.is_none() || (is_on_show && shared.shown_run().is_none()) {
+            return;
+        }
+        let text = if is_on_show { "Show results" } else { "Columns…" };
+        let hint = "Shows the columns of the files and their meanings in place of the results, or the results again.";
+        if ui.add(ghost_button(text)).on_hover_text(hint).clicked() {
+            self.shows_columns = !is_on_show;
+            ui.request_repaint();
         }
     }
 }
 
 /// Lists the open files. Returns the one to be closed.
-fn open_files_ui(ui: &mut Ui, draft: &Draft) -> Option<OpenFile> {
-    let mut closed = None;
-    let recordings = draft.paths().into_iter().enumerate();
-    let recordings = recordings.map(|(number, path)| (OpenFile::Recording(number), path));
-    let tests = draft.tests();
-    let tests = tests.map(|(recording, test)| (OpenFile::Test(recording.to_owned()), test.to_owned()));
-    let positions = draft.plan.import.positions.iter();
-    let positions = positions.map(|path| (OpenFile::Positions, path.clone()));
-    let appended = draft.plan.import.append.iter().enumerate();
-    let appended = appended.map(|(number, set)| (OpenFile::Appended(number), set.data.clone()));
-    for (file, path) in recordings.chain(appended).chain(tests).chain(positions) {
-        let name = file_name(&path);
-        let what = match &file {
-            OpenFile::Recording(0) => String::new(),
-            OpenFile::Recording(_) => ", joined".to_owned(),
-            OpenFile::Appended(_) => ", appended".to_owned(),
-            OpenFile::Test(recording) if draft.files.len() > 1 => {
-                format!(", for the test of {}", file_name(recording))
+fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<(Close, usize)> {
+    let recipe = &import.plan.import;
+    let mut files: Vec<(Close, usize, PathBuf, String)> = Vec::new();
+    for (number, path) in import.paths().into_iter().enumerate() {
+        let what = if number == 0 { "" } else { ", joined" };
+        files.push((RecordingEditor::close, number, path, what.to_owned()));
+    }
+    for (number, set) in recipe.append.iter().enumerate() {
+        let close: Close = |editor, number| {
+            if let Some(import) = &mut editor.import {
+                import.close_appended(number);
             }
-            OpenFile::Test(_) => ", for the test".to_owned(),
-            OpenFile::Positions => ", positions".to_owned(),
         };
+        files.push((close, number, set.data.clone(), ", appended".to_owned()));
+    }
+    for (number, (recording, test)) in import.tests().into_iter().enumerate() {
+        let of = format!(" of {}", file_name(&recording));
+        let what = format!(", for the test{}", if import.files.len() > 1 { &of } else { "" });
+        let close: Close = |editor, _| editor.import.iter_mut().for_each(|import| import.edit().test = None);
+        files.push((close, number, test, what));
+    }
+    if let Some(path) = &recipe.positions {
+        let close: Close = |editor, _| {
+            let import = editor.import.iter_mut();
+            import.for_each(|import| import.edit().import.positions = None);
+        };
+        files.push((close, 0, path.clone(), ", positions".to_owned()));
+    }
+    let mut closed = None;
+    for (close_file, number, path, what) in files {
+        let name = file_name(&path);
         ui.horizontal(|ui| {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let close = ui.small_button("×");
                 close.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Close {name}")));
                 if close.on_hover_text("Closes this file.").clicked() {
-                    closed = Some(file);
+                    closed = Some((close_file, number));
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     let text = format!("{name}{what}");
@@ -241,180 +197,18 @@ fn open_files_ui(ui: &mut Ui, draft: &Draft) -> Option<OpenFile> {
     closed
 }
 
-/// Name and contents of the sample: made by `examples/soft_skin.rs`.
-const NAME: &str = "soft_skin.csv";
-const TEXT: &str = include_str!("../../../../../assets/samples/soft_skin.csv");
-
-/// Writes the sample recording into `folder`, and returns its path.
-///
-/// # Errors
-/// If it cannot be written.
-pub(super) fn write_sample(folder: &Path) -> Result<PathBuf, String> {
-    let path = folder.join(NAME);
-    let refused = |error: &dyn std::fmt::Display| format!("the sample recording cannot be written: {error}");
-    fs::create_dir_all(folder).map_err(|error| refused(&error))?;
-    // An unchanged file keeps its modification time.
-    if fs::read(&path).is_ok_and(|written| written == TEXT.as_bytes()) {
-        return Ok(path);
-    }
-    atomic_write(&path, |file| file.write_all(TEXT.as_bytes())).map_err(|error| refused(&error))?;
-    Ok(path)
-}
-
 const RECIPE: FileWords = FileWords {
     kind: "recipe",
     description: "The source of the samples as JSON: the array and its scene, or the files of a recording, the meaning of \
-                  their columns and the division of the samples. It opens here and in a terminal (train --recipe FILE).",
+                  their columns and the division of the samples. It opens here and in the terminal.",
     extensions: &["json"],
 };
 
-/// Returns the export of the recipe of the source.
-pub fn recipe_export(shared: &Shared) -> Export<'static> {
-    let ask = shared.setup().map(|setup| -> Ask<'static> {
-        Box::new(move || {
-            let stem = file_stem("recipe", &setup);
-            let contents = Contents::new(move |path| RecipeFile::from(&setup).save(path));
-            Effect::ChooseFile(FileTask::save(RECIPE, &stem, contents))
-        })
-    });
-    Export {
-        group: ExportGroup::Training,
-        name: "Recipe".to_owned(),
-        form: "JSON".to_owned(),
-        description: RECIPE.description,
-        ask,
-    }
-}
-
-/// An import to be opened again: its plan, and the known checksums of its files.
-#[derive(Clone, Debug)]
-pub(super) struct Reopened {
-    /// Plan with absolute paths, and checksums; an empty checksum is not known.
-    pub(super) recorded: Recorded,
-    /// Training to be resumed once all files are found.
-    pub(super) checkpoint: Option<Box<CheckpointFile>>,
-    /// Names of files whose contents differ from those at the time of the run.
-    pub(super) changed: Vec<String>,
-}
-
-impl From<Recorded> for Reopened {
-    fn from(recorded: Recorded) -> Self {
-        Self {
-            recorded,
-            checkpoint: None,
-            changed: Vec::new(),
-        }
-    }
-}
-
-impl From<Plan> for Reopened {
-    /// Returns the import of a plan without known checksums.
-    fn from(plan: Plan) -> Self {
-        let unknown = |path| FileChecksum {
-            path,
-            crc32: String::new(),
-        };
-        Self::from(Recorded {
-            files: plan.files().into_iter().map(unknown).collect(),
-            samples_crc32: String::new(),
-            search: None,
-            combined: None,
-            chosen_intervals: None,
-            plan,
-        })
-    }
-}
-
-impl Reopened {
-    /// Returns the paths of files that no longer exist.
-    pub(super) fn missing(&self) -> Vec<&Path> {
-        self.recorded.missing()
-    }
-
-    /// Notes the names of files whose contents have changed.
-    ///
-    /// # Errors
-    /// If a file cannot be read, or has changed while a training is to be resumed with it.
-    pub(super) fn compare(&mut self) -> Result<(), String> {
-        let mut changed = Vec::new();
-        for file in &self.recorded.files {
-            if file.path.is_file() && !has_checksum(&file.path, &file.crc32)? {
-                changed.push(file_name(&file.path));
-            }
-        }
-        if let (Some(_), Some(name)) = (&self.checkpoint, changed.first()) {
-            return Err(format!(
-                "{name} has changed since the training was saved, so the training cannot be resumed with it. \
-                 Use the original file."
-            ));
-        }
-        self.changed = changed;
-        Ok(())
-    }
-
-    /// Replaces a missing file by `found`, and other missing files by those of the same name and contents next to it.
-    ///
-    /// # Errors
-    /// If a file cannot be read.
-    pub(super) fn relocate(&mut self, missing: &Path, found: &Path) -> Result<(), String> {
-        self.recorded = self.recorded.relocated(missing, found);
-        let folder = found.parent().unwrap_or(Path::new(""));
-        for file in self.recorded.files.clone() {
-            let neighbour = file.path.file_name().map(|name| folder.join(name));
-            if let Some(neighbour) = neighbour.filter(|neighbour| !file.path.exists() && neighbour.is_file())
-                && has_checksum(&neighbour, &file.crc32)?
-            {
-                self.recorded = self.recorded.relocated(&file.path, &neighbour);
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Returns true if the file has this checksum, or the checksum is not known.
-fn has_checksum(path: &Path, crc32: &str) -> Result<bool, String> {
-    if crc32.is_empty() {
-        return Ok(true);
-    }
-    let found = file_crc32(path, &mut |_| ControlFlow::Continue(()));
-    Ok(found.map_err(|error| error.to_string())? == crc32)
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use super::*;
-
-    #[test]
-    fn a_file_is_found_with_its_neighbours_and_changed_contents_are_reported() {
-        let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        for (name, text) in [("sensor.csv", "1\n"), ("states.csv", "2\n"), ("other.csv", "3\n")] {
-            fs::write(at(name), text).unwrap();
-        }
-        let gone = |name: &str| PathBuf::from("/gone").join(name);
-        let mut plan = Plan::default();
-        plan.import.data = gone("sensor.csv");
-        plan.import.join = vec![decoupler_files::import::Joined {
-            file: gone("states.csv"),
-            ..Default::default()
-        }];
-        let mut reopened = Reopened::from(plan);
-        for file in &mut reopened.recorded.files {
-            file.crc32 = file_crc32(&at(&file_name(&file.path)), &mut |_| ControlFlow::Continue(())).unwrap();
-        }
-        assert_eq!(reopened.missing(), [gone("sensor.csv"), gone("states.csv")]);
-
-        let mut found = reopened.clone();
-        found.relocate(&gone("sensor.csv"), &at("sensor.csv")).unwrap();
-        assert!(found.missing().is_empty(), "the other file is next to it");
-        assert_eq!(found.recorded.plan.import.join[0].file, at("states.csv"));
-        found.compare().unwrap();
-        assert!(found.changed.is_empty());
-
-        reopened.relocate(&gone("sensor.csv"), &at("other.csv")).unwrap();
-        reopened.compare().unwrap();
-        assert_eq!(reopened.changed, ["other.csv"]);
-    }
+/// Returns the file of the recipe of the source.
+pub fn recipe_task(shared: &Shared) -> Result<FileTask, String> {
+    let setup = shared.setup()?;
+    let stem = file_stem("recipe", &setup);
+    Ok(FileTask::save(RECIPE, &stem, move |path| {
+        RecipeFile::from(&setup).save(path)
+    }))
 }

@@ -1,16 +1,19 @@
 //! Recordings as the source of a training: their files, the meaning of their columns, and the division of their samples.
 //!
-//! [`editor`] owns the import. [`opening`] reads files in the background, and checks the import whenever it changes; a
-//! [`draft`] holds the choices of the user; [`files_section`] shows the files, including missing ones.
+//! [`editor`] edits the plan of an [`import`]. In the background, [`reading`] inspects files ([`opening`]) and, whenever the plan
+//! has changed, its samples ([`checking`]). [`files_section`] and [`options`] are parts of the form, [`columns_table`] and
+//! [`samples_card`] the middle of the view.
 
-mod columns_card;
+mod checking;
 mod columns_table;
-mod draft;
 mod editor;
 mod files_section;
-mod layout_form;
+mod import;
 mod opening;
+mod options;
+mod reading;
+mod samples_card;
 
-pub(super) use columns_card::bias;
 pub use editor::RecordingEditor;
-pub use files_section::recipe_export;
+pub use files_section::recipe_task;
+pub(super) use options::bias;

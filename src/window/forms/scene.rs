@@ -1,0 +1,208 @@
+//! The scene of a simulated array: rows, axes, loading and noise; and its samples.
+
+use decoupler_core::{
+    dataset::Simulation,
+    evaluation::{Outlook, RunSettings},
+    scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene},
+    text::counted,
+};
+use decoupler_files::export::format_number;
+use eframe::egui::Ui;
+
+use super::{Fields, Look, Row, network::ROWS};
+use crate::window::{
+    glossary,
+    widgets::{
+        dim_ui,
+        fields::{capitalised, count_ui, in_percent, input_text, list_ui, percent_ui, quantity_ui},
+        fold_ui,
+    },
+};
+
+/// Numbers of samples, and the seed.
+pub const SAMPLES: [Row; 4] = [
+    Row("samples", "Training samples", Look::Number("")),
+    Row("validation samples", "Validation samples", Look::Number("")),
+    Row("test samples", "Test samples", Look::Number("")),
+    Row("seed", "Seed", Look::Number("")),
+];
+
+const AXES: Row = Row("axes", "Axes", Look::Options(&[("z", "z"), ("xyz", "x, y, z")]));
+
+const LOADING: Row = Row(
+    "loading",
+    "Loading",
+    // A correlation length of twice the assumed node pitch.
+    Look::List(&[
+        ("random", "Random nodes"),
+        ("smooth:4", "Smooth field"),
+        ("indenter", "Indenter"),
+    ]),
+);
+
+const NOISE: [Row; 4] = [
+    Row("noise", "Relative noise", Look::Number("%")),
+    Row("noise ohm", "Additive noise", Look::Number("Ω")),
+    Row("adc bits", "Converter bits", Look::Number("")),
+    Row("drift", "Drift", Look::Number("%")),
+];
+
+const NOISY_SETS: Row = Row(
+    "noise in",
+    "Noise in",
+    Look::Options(&[("both", "Both"), ("training", "Training"), ("test", "Test")]),
+);
+
+/// Rows, axes, loading, compression and noise of the settings, which are of a simulated array.
+pub fn scene_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
+    fields.show(ui, &[ROWS]);
+    if let Some(Simulation { sensor, scene, .. }) = fields.settings.simulation_mut()
+        && let Rows::One(row) = &mut scene.rows
+    {
+        let (mut number, hint) = (*row + 1, "Number of the row-wire that is read, from 1.");
+        count_ui(ui, "Row", hint, &mut number, 1..=sensor.scale.rows());
+        *row = number - 1;
+    }
+    fields.show(ui, &[AXES]);
+    if let Some(Simulation { scene, .. }) = fields.settings.simulation_mut()
+        && let Movement::Xyz { largest_shift_mm } = &mut scene.movement
+    {
+        let hint = "Largest displacement of a node along x and along y, in either direction, in mm.";
+        quantity_ui(ui, "Largest shift", hint, largest_shift_mm, 1e-6..=1e3, "mm");
+    }
+    fields.show(ui, &[LOADING]);
+    if let Some(Simulation { scene, .. }) = fields.settings.simulation_mut() {
+        match &mut scene.loading {
+            Loading::RandomNodes => {}
+            Loading::SmoothField { correlation_length_mm } => {
+                let (name, hint) = ("Correlation length", glossary::CORRELATION_LENGTH.hint);
+                quantity_ui(ui, name, hint, correlation_length_mm, 1e-3..=1e6, "mm");
+            }
+            Loading::Indenter(indenter) => indenter_ui(ui, indenter),
+        }
+        let (name, hint) = ("Largest compression", glossary::LARGEST_COMPRESSION.hint);
+        let usual = Scene::default().largest_compression;
+        percent_ui(ui, name, hint, &mut scene.largest_compression, usual, 0.001..=99.0);
+    }
+    let noise = fields.settings.simulation().map(|simulation| simulation.scene.noise);
+    let noise = noise.unwrap_or_default();
+    fold_ui(ui, "Noise on resistance", &of_noise(noise), |ui| {
+        fields.show(ui, &NOISE);
+        if !noise.is_none() {
+            fields.show(ui, &[NOISY_SETS]);
+        }
+    });
+}
+
+/// Shape and sizes of an indenter. A shape that the window does not offer, from a file, is shown and kept.
+fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
+    let hint =
+        "Shape of the indenter. Its position, depth, size, direction and tilt are drawn at random for each snapshot.";
+    let name = capitalised(indenter.name());
+    let mut shapes = vec![
+        ("sphere", "Sphere", "A ball."),
+        ("flat punch", "Flat punch", "The flat end of a round bar."),
+    ];
+    if !shapes.iter().any(|(shape, ..)| *shape == indenter.name()) {
+        shapes.push((indenter.name(), &name, "A shape from a file."));
+    }
+    if let Some(picked) = list_ui(ui, "Shape", hint, &shapes, indenter.name()) {
+        let found = Indenter::all().into_iter().find(|offered| offered.name() == picked);
+        indenter.shape = found.map_or(indenter.shape, |found| found.shape);
+    }
+    let (radius, tilt) = match &mut indenter.shape {
+        IndenterShape::Sphere { radius_mm } => (Some(radius_mm), None),
+        IndenterShape::FlatPunch(body) | IndenterShape::Cylinder(body) => {
+            (Some(&mut body.radius_mm), Some(&mut body.largest_tilt_degrees))
+        }
+        IndenterShape::Edge { largest_tilt_degrees } => (None, Some(largest_tilt_degrees)),
+    };
+    if let Some(radius) = radius {
+        let hint = "Smallest radius of the indenter, in mm.";
+        if quantity_ui(ui, "Radius from", hint, &mut radius.smallest, 1e-3..=1e6, "mm").changed() {
+            radius.largest = radius.largest.max(radius.smallest);
+        }
+        let hint = "Largest radius of the indenter, in mm.";
+        if quantity_ui(ui, "Radius to", hint, &mut radius.largest, 1e-3..=1e6, "mm").changed() {
+            radius.smallest = radius.smallest.min(radius.largest);
+        }
+    }
+    if let Some(tilt) = tilt {
+        let hint =
+            "Largest angle between the indenter and the surface, in degrees; each tilt is drawn between 0 and this.";
+        quantity_ui(ui, "Largest tilt", hint, tilt, 0.0..=45.0, "°");
+    }
+    let hint = glossary::SPREAD.hint;
+    quantity_ui(ui, "Spread", hint, &mut indenter.spread_mm, 1e-3..=1e6, "mm");
+}
+
+/// The noise in a line: `0.1 % relative, 12 bits, in test only`.
+fn of_noise(noise: Noise) -> String {
+    let percent = |share: f64| input_text(in_percent(share));
+    let sources = [
+        (noise.relative > 0.0).then(|| format!("{} % relative", percent(noise.relative))),
+        (noise.additive_ohm > 0.0).then(|| format!("{} Ω", input_text(noise.additive_ohm))),
+        noise.converter_bits.map(|bits| format!("{bits} bits")),
+        (noise.drift > 0.0).then(|| format!("{} % drift", percent(noise.drift))),
+        (!noise.is_none() && noise.sets != NoisySets::Both).then(|| format!("in {} only", <&str>::from(noise.sets))),
+    ];
+    sources.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+/// Numbers of unknowns and equations of the scene, and its condition number.
+pub fn size_ui(ui: &mut Ui, simulation: &Simulation, outlook: Option<&Outlook>) {
+    let scale = simulation.sensor.scale;
+    let rows = simulation.rows().unwrap_or(0);
+    let text = format!(
+        "{}, {} per frame",
+        counted(rows * simulation.scene.unknowns_per_row(scale), "unknown"),
+        counted(rows * scale.columns(), "equation")
+    );
+    dim_ui(ui, &text).on_hover_text(
+        "A frame is one reading of every row. Unknowns are the coordinates that vary in the scene; each resistance \
+         gives an equation, Eq. (2). What does not vary is not modelled.",
+    );
+    let condition = match outlook.map(|outlook| outlook.worst_row.condition()) {
+        Some(condition) if condition.is_infinite() => "infinite".to_owned(),
+        condition => format_number(condition),
+    };
+    dim_ui(ui, &format!("Condition number {condition}")).on_hover_text(glossary::CONDITION_NUMBER.hint);
+}
+
+/// Loading, rows, axes and noise.
+pub fn of_scene(scene: &Scene) -> String {
+    let loading = match scene.loading {
+        Loading::RandomNodes => "random nodes",
+        Loading::SmoothField { .. } => "smooth field",
+        Loading::Indenter(indenter) => indenter.name(),
+    };
+    let rows = match scene.rows {
+        Rows::One(row) => format!("row {}", row + 1),
+        rows => format!("{rows} rows"),
+    };
+    let axes = if scene.movement == Movement::Z { "" } else { ", x y z" };
+    let noise = if scene.noise.is_none() { "" } else { ", noise" };
+    format!("{loading}, {rows}{axes}{noise}")
+}
+
+/// Numbers of training, validation and test samples, and the seed.
+pub fn of_samples(settings: &RunSettings) -> String {
+    let [training, validation, test, seed] = SAMPLES.map(|row| row.text(settings).unwrap_or_default());
+    format!("{training} + {validation} + {test}, seed {seed}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_summarised_in_a_line() {
+        let noise = Noise {
+            relative: 0.07,
+            converter_bits: Some(12),
+            sets: NoisySets::Test,
+            ..Noise::default()
+        };
+        assert_eq!(of_noise(noise), "7 % relative, 12 bits, in test only");
+    }
+}

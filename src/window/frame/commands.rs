@@ -1,0 +1,162 @@
+use std::ops::RangeInclusive;
+
+use decoupler_core::evaluation::RunSettings;
+use decoupler_files::figure::SequentialMap;
+use eframe::egui::{Context, Key, Modifiers, util::undoer::Undoer};
+
+use super::{
+    DecouplerWindow,
+    help::{Help, Page},
+    modal::{Modal, Palette},
+};
+use crate::window::{
+    shared::{Command, Effect, Look, Offer, Offers, RecordingDraft, Shared, SourceKind, ViewKind},
+    test_view::HeightScale,
+};
+
+/// Interface scales offered to the user, relative to the default.
+pub(super) const SCALES: RangeInclusive<f32> = 0.8..=2.0;
+
+/// Step between scales.
+const STEP: f32 = 0.1;
+
+impl DecouplerWindow {
+    /// Offers the commands of the current view and of the window, and carries out those that the user asked for.
+    pub(super) fn take_commands(&mut self, ctx: &Context, effects: &mut Vec<Effect>) -> Vec<Offer> {
+        // On many keyboards plus is the shifted equals sign.
+        if self.modal.is_none() && ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Equals)) {
+            self.picked = Some(Command::Larger);
+        }
+        let is_listed = self.picked.is_some() || matches!(self.modal, Some(Modal::Palette(_)));
+        let mut offers = Offers::new(ctx, self.picked.take(), self.modal.is_none());
+        let view = self.views.get(self.shared.shown);
+        view.take_commands(&mut offers, &self.shared, effects);
+        // These have no keys, and take longer to list.
+        if is_listed {
+            for shown in view.shown(&self.shared) {
+                if offers.offer(Command::Export(shown.action()), shown.item.is_ok()) {
+                    effects.push(shown.ask());
+                }
+            }
+        }
+        for (command, is_possible) in self.commands() {
+            if offers.offer(command.clone(), is_possible) {
+                self.carry_out(&command);
+            }
+        }
+        offers.into_list()
+    }
+
+    /// Returns the commands of the window, and whether each is possible now.
+    fn commands(&self) -> Vec<(Command, bool)> {
+        let (shared, look) = (&self.shared, self.shared.look);
+        // The settings of a running training cannot change.
+        let is_free = !shared.phase.is_busy();
+        let drafts = drafts(shared);
+        let scale = self.ctx.zoom_factor();
+        let heights = match look.heights {
+            HeightScale::Stroke => Command::FreeHeights,
+            HeightScale::Fitted => Command::LockHeights,
+        };
+        let mut commands = vec![
+            (Command::Undo, is_free && self.undoer.has_undo(&drafts)),
+            (Command::Redo, is_free && self.undoer.has_redo(&drafts)),
+        ];
+        commands.extend(ViewKind::ALL.map(|view| (Command::Show(view), view != shared.shown)));
+        commands.push((if look.is_dark { Command::Light } else { Command::Dark }, true));
+        commands.extend(SequentialMap::ALL.map(|map| (Command::Colours(map), map != look.colours)));
+        commands.extend([
+            (heights, true),
+            (Command::FreeErrors, look.error_limit_mm.is_some()),
+            (Command::Larger, scale < *SCALES.end() - 0.5 * STEP),
+            (Command::Smaller, scale > *SCALES.start() + 0.5 * STEP),
+            (Command::UsualSize, (scale - 1.0).abs() > 0.5 * STEP),
+            (Command::Search, true),
+            (Command::Keys, true),
+            (Command::Glossary, true),
+            (Command::About, true),
+        ]);
+        commands
+    }
+
+    /// Carries out a command of the window.
+    pub(super) fn carry_out(&mut self, command: &Command) {
+        let look = self.shared.look;
+        match command {
+            Command::Undo => {
+                let earlier = self.undoer.undo(&drafts(&self.shared)).cloned();
+                self.take_drafts(earlier);
+            }
+            Command::Redo => {
+                let later = self.undoer.redo(&drafts(&self.shared)).cloned();
+                self.take_drafts(later);
+            }
+            Command::Show(view) => self.show(*view),
+            Command::Dark | Command::Light => {
+                let is_dark = *command == Command::Dark;
+                self.chosen.is_dark = Some(is_dark);
+                self.set_dark(is_dark);
+            }
+            Command::Colours(colours) => self.look(Look {
+                colours: *colours,
+                ..look
+            }),
+            Command::LockHeights => self.look(Look {
+                heights: HeightScale::Stroke,
+                ..look
+            }),
+            Command::FreeHeights => self.look(Look {
+                heights: HeightScale::Fitted,
+                ..look
+            }),
+            Command::FreeErrors => self.look(Look {
+                error_limit_mm: None,
+                ..look
+            }),
+            Command::Larger => self.set_scale(self.ctx.zoom_factor() + STEP),
+            Command::Smaller => self.set_scale(self.ctx.zoom_factor() - STEP),
+            Command::UsualSize => self.set_scale(1.0),
+            Command::Search => self.modal = Some(Modal::Palette(Palette::default())),
+            Command::Keys => self.modal = Some(Modal::Help(Help::open(Page::Keys, ""))),
+            Command::Glossary => self.modal = Some(Modal::Help(Help::open(Page::Glossary, ""))),
+            Command::About => self.modal = Some(Modal::Help(Help::open(Page::About, ""))),
+            // Those of views, which carry them out.
+            _ => self.picked = Some(command.clone()),
+        }
+        self.ctx.request_repaint();
+    }
+
+    /// Sets the interface scale, rounded to whole steps and limited to [`SCALES`].
+    pub(super) fn set_scale(&mut self, scale: f32) {
+        let scale = ((scale / STEP).round() * STEP).clamp(*SCALES.start(), *SCALES.end());
+        self.ctx.set_zoom_factor(scale);
+        self.chosen.scale = Some(scale);
+    }
+
+    /// Takes settings that were undone or redone.
+    fn take_drafts(&mut self, drafts: Option<Drafts>) {
+        let Some((source, draft, mut recording)) = drafts else {
+            return;
+        };
+        match &recording.plan {
+            Ok(plan) if !self.shared.recording.is_plan(Some(plan)) => self.views.open_plan(plan),
+            Ok(_) => {}
+            // Undoing closes no files.
+            Err(_) => recording.plan.clone_from(&self.shared.recording.plan),
+        }
+        self.shared.recording = recording;
+        self.shared.draft = draft;
+        self.choose_source(source);
+    }
+}
+
+/// Everything that the user sets for the next training.
+pub(super) type Drafts = (SourceKind, RunSettings, RecordingDraft);
+
+/// Undo and redo history of the settings. A drag counts as one change, and so do changes less than a second apart.
+pub(super) type DraftsUndoer = Undoer<Drafts>;
+
+/// Returns the present settings; their plan is shared, not copied.
+pub(super) fn drafts(shared: &Shared) -> Drafts {
+    (shared.source, shared.draft, shared.recording.clone())
+}

@@ -1,0 +1,301 @@
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use decoupler_files::export::exit_leaving_nothing;
+use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui, UiBuilder};
+
+use super::{
+    clipboard::Copying,
+    commands::{DraftsUndoer, SCALES, drafts},
+    export_dialog::{card_menu_ui, export_menu_ui},
+    files::{Dialogs, Files},
+    modal::Modal,
+    notices::Notices,
+    remembered::{Memory, Remembered, WindowFile},
+    top_bar::{edge_ui, top_bar_ui, widths_points},
+};
+use crate::{
+    signals::on_termination,
+    window::{
+        job::{Background, Wake},
+        preview::PreviewEvent,
+        shared::{Command, Effect, Matter, Notice, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
+        theme::{self, Theme, space},
+        training_worker::{Request, Worker},
+        views::Views,
+    },
+};
+
+/// The window: the shared state, the views, and the one place where their effects are applied.
+pub struct DecouplerWindow {
+    pub(super) shared: Shared,
+    pub(super) views: Views,
+    pub(super) notices: Notices,
+    /// The card over the window that must be answered first.
+    pub(super) modal: Option<Modal>,
+    /// The checkpoint that the training of the Train view was opened from.
+    pub(super) opened: Option<PathBuf>,
+    pub(super) worker: Worker,
+    /// Folder for the checkpoints of running trainings, and the interval at which they are saved.
+    pub(super) keeping: Option<(PathBuf, Duration)>,
+    pub(super) previews: Background<PreviewEvent>,
+    pub(super) runs: RunsWorker,
+    pub(super) files: Files,
+    pub(super) copying: Copying,
+    pub(super) dialogs: Dialogs,
+    /// Command picked from the list or by a button, which is carried out in the next frame.
+    pub(super) picked: Option<Command>,
+    pub(super) undoer: DraftsUndoer,
+    /// What the user has chosen and the shared state does not hold: theme, size, scale, and widths of columns.
+    pub(super) chosen: Remembered,
+    /// The file that keeps what is restored at the next start, if there is one.
+    pub(super) memory: Option<Memory>,
+    pub(super) wake: Wake,
+    pub(super) ctx: Context,
+    /// Files that the window was opened with.
+    pub(super) given: Vec<PathBuf>,
+}
+
+impl DecouplerWindow {
+    /// Opens with the state remembered in `file`, and keeps that file up to date. Without a file it opens on the default
+    /// array.
+    pub fn new(ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
+        let woken = ctx.clone();
+        Self::woken_by(Arc::new(move || woken.request_repaint()), ctx, desktop, file)
+    }
+
+    /// As [`Self::new`]; `wake` is called whenever there is an event to handle.
+    pub(super) fn woken_by(wake: Wake, ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
+        let mut remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
+        let damage = file.as_ref().and_then(|file| file.damage.clone());
+        let is_usually_dark = ctx.system_theme() != Some(egui::Theme::Light);
+        let is_dark = remembered.is_dark.unwrap_or(is_usually_dark);
+        theme::install(ctx, is_dark);
+        // Our own shortcuts keep to sizes at which everything fits.
+        ctx.options_mut(|options| options.zoom_with_keyboard = false);
+        let mut shared = Shared::new(is_dark);
+        let mut views = Views::new(&wake);
+        shared.look.colours = remembered.colours.unwrap_or(shared.look.colours);
+        shared.draft = remembered.draft.unwrap_or(shared.draft);
+        if let Some(settings) = remembered.recording {
+            // Files of older versions do not say it: settings that the user gave are not chosen.
+            let is_usual = settings == shared.recording.settings;
+            shared.recording.is_auto = remembered.is_auto.unwrap_or(is_usual);
+            shared.recording.settings = settings;
+        }
+        shared.source = remembered.source.unwrap_or_default();
+        if let Some(plan) = remembered.plan.take() {
+            views.open_plan(&plan.0);
+            shared.recording.plan = Ok(plan.0);
+        }
+        let shown = ViewKind::ALL
+            .into_iter()
+            .find(|view| Some(view.name()) == remembered.view.as_deref());
+        shared.shown = shown.unwrap_or_default();
+        let mut window = Self {
+            shared,
+            views,
+            notices: Notices::default(),
+            modal: None,
+            opened: None,
+            worker: Worker::start(Arc::clone(&wake)),
+            keeping: None,
+            previews: Background::new("preview", Arc::clone(&wake)),
+            runs: RunsWorker::start(Arc::clone(&wake)),
+            files: Files::new(Arc::clone(&wake)),
+            copying: Copying::new(desktop, Arc::clone(&wake)),
+            dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
+            picked: None,
+            undoer: DraftsUndoer::default(),
+            memory: file.map(|file| Memory::new(file, Arc::clone(&wake))),
+            chosen: remembered,
+            wake,
+            ctx: ctx.clone(),
+            given: Vec::new(),
+        };
+        if let Some(damage) = damage {
+            window.notices.fail(Matter::Memory, damage);
+        }
+        if let Some(scale) = window.chosen.scale.filter(|scale| SCALES.contains(scale)) {
+            window.set_scale(scale);
+        }
+        window.request_preview();
+        window
+    }
+
+    /// Shows the runs in the folder `path`, and keeps finished trainings there from now on. Without it they are gone when
+    /// the window closes.
+    #[must_use]
+    pub fn keeping_runs(self, path: PathBuf) -> Self {
+        self.runs.ask(RunsRequest::Open(path));
+        self
+    }
+
+    /// Keeps checkpoints of running trainings in `folder`, saved every `interval`, and offers those that were cut short when
+    /// the program ended.
+    #[must_use]
+    pub fn keeping_trainings(mut self, folder: PathBuf, interval: Duration) -> Self {
+        self.keeping = Some((folder, interval));
+        self.keep_trainings();
+        self
+    }
+
+    /// Keeps checkpoints of the worker's trainings, if they are to be kept.
+    pub(super) fn keep_trainings(&self) {
+        if let Some((folder, interval)) = &self.keeping {
+            self.worker.ask(Request::Keep(folder.clone(), *interval));
+        }
+    }
+
+    /// Saves the running training and ends the program on SIGTERM and SIGHUP, even if the window does not respond.
+    pub(super) fn save_on_termination(&self) {
+        let save = self.worker.saver();
+        on_termination(move |status| {
+            save();
+            exit_leaving_nothing(i32::from(status));
+        });
+    }
+
+    /// State that all views read.
+    pub fn shared(&self) -> &Shared {
+        &self.shared
+    }
+
+    /// The views, displayed or not.
+    pub fn views(&self) -> &Views {
+        &self.views
+    }
+
+    /// The name of the current view.
+    pub fn shown(&self) -> &'static str {
+        self.shared.shown.name()
+    }
+
+    /// Newest notice that is shown to the user.
+    pub fn notice(&self) -> Option<&Notice> {
+        self.notices.newest()
+    }
+
+    /// Lays out the window and handles the input of the user.
+    pub fn show_ui(&mut self, ui: &mut Ui) {
+        // Another window may have changed the run list.
+        if ui.input(|input| input.events.contains(&Event::WindowFocused(true))) {
+            self.runs.ask(RunsRequest::Look);
+        }
+        let mut effects = Vec::new();
+        let offers = self.take_commands(ui.ctx(), &mut effects);
+        self.take_dropped(ui.ctx());
+        let (kind, shared) = (self.shared.shown, &self.shared);
+        let view = self.views.get(kind);
+        let palette = Theme::of(ui).palette;
+        let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
+        let columns = kind.columns(ui.available_width());
+        let [form_width, report_width] = widths_points(&columns, &self.chosen, ui.available_width());
+        // The strip of the scroll bar is the margin on the right.
+        let side = Margin {
+            left: 12,
+            right: 2,
+            top: 4,
+            bottom: 4,
+        };
+        let top_bar = Panel::top("top bar")
+            .exact_size(space(11))
+            .frame(panel(Margin::symmetric(8, 0)))
+            .show(ui, |ui| {
+                top_bar_ui(ui, kind, &offers, |ui| {
+                    export_menu_ui(ui, || view.shown(shared), &mut effects);
+                    view.tools_ui(ui, shared, &mut effects);
+                })
+            });
+        let status_line = Panel::bottom("status line")
+            .exact_size(space(7))
+            .frame(panel(Margin::symmetric(12, 0)))
+            .show(ui, |ui| ui.max_rect());
+        let form = Panel::left("configuration")
+            .exact_size(form_width)
+            .resizable(false)
+            .frame(panel(side))
+            .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
+        let report = columns.has_report.then(|| {
+            Panel::right("report")
+                .exact_size(report_width)
+                .resizable(false)
+                .frame(panel(side))
+                .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
+        });
+        let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
+        let middle = egui::CentralPanel::default()
+            .frame(background)
+            .show(ui, |ui| view.body_ui(ui, shared, &mut effects));
+        let status = middle.inner.unwrap_or_else(|| training_status(shared));
+        status.show(&mut ui.new_child(UiBuilder::new().max_rect(status_line.inner)));
+        let parts = [Some(&middle.response), report.as_ref().map(|report| &report.response)];
+        for part in parts.into_iter().flatten() {
+            card_menu_ui(part, || view.shown(shared), &mut effects);
+        }
+        edge_ui(
+            ui,
+            "Width of the left column",
+            form.response.rect,
+            true,
+            &mut self.chosen.form_points,
+        );
+        if let Some(report) = report {
+            let width = &mut self.chosen.report_points;
+            edge_ui(ui, "Width of the right column", report.response.rect, false, width);
+        }
+        if changes_something(ui.ctx()) || !effects.is_empty() {
+            self.ctx.request_repaint();
+        }
+        self.notices_ui(ui, middle.response.rect, &mut effects);
+        self.apply_all(effects);
+        if let Some(command) = top_bar.inner {
+            self.carry_out(&command);
+        }
+        self.undoer
+            .feed_state(ui.input(|input| input.time), &drafts(&self.shared));
+        self.modal_ui(ui, &offers);
+        self.dropping_ui(ui);
+        self.remember();
+        // Work begun in this frame must be finished too.
+        self.take_close_request();
+    }
+
+    /// Applies the effects requested by views.
+    pub(super) fn apply_all(&mut self, effects: Vec<Effect>) {
+        for effect in effects {
+            self.apply(effect);
+        }
+    }
+}
+
+/// Returns `true` if the user did something in this frame that parts of the window already drawn may depend on: one
+/// frame more shows it everywhere. Merely moving the pointer does not count.
+pub(super) fn changes_something(ctx: &Context) -> bool {
+    ctx.input(|input| {
+        let is_change = |event: &Event| match event {
+            Event::PointerMoved(_) | Event::MouseMoved(_) => input.pointer.any_down(),
+            Event::PointerGone | Event::WindowFocused(_) => false,
+            _ => true,
+        };
+        input.events.iter().any(is_change)
+    })
+}
+
+impl eframe::App for DecouplerWindow {
+    fn logic(&mut self, _ctx: &Context, _frame: &mut eframe::Frame) {
+        self.take_events();
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        self.show_ui(ui);
+    }
+}
+
+/// Services of the desktop that the window uses: file dialogs and the clipboard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Desktop {
+    /// The desktop's own.
+    Native,
+    /// None: the window asks for paths itself, and copies stay within the toolkit. For tests.
+    None,
+}

@@ -1,0 +1,232 @@
+//! Everything that the user can do by a key or by name.
+
+use decoupler_files::figure::SequentialMap;
+use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
+
+use super::ViewKind;
+
+/// Something that the user can do by a key, or by picking it from the list of all commands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Command {
+    // Of the Train view.
+    Train,
+    TrainLonger,
+    PauseTraining,
+    ResumeTraining,
+    StopTraining,
+    OpenFiles,
+    PressMiddle,
+    NextSample,
+    PreviousSample,
+    Chart(&'static str),
+    NextSection,
+    PreviousSection,
+    SectionAlongColumns,
+    SectionAlongRows,
+    // Of other views, which name their work: "Run experiment".
+    Begin(&'static str),
+    Cancel(&'static str),
+    CrossValidate,
+    Record,
+    ReZero,
+    PlayReplay,
+    // Of the window.
+    Export(String),
+    Undo,
+    Redo,
+    Show(ViewKind),
+    Dark,
+    Light,
+    Colours(SequentialMap),
+    LockHeights,
+    FreeHeights,
+    FreeErrors,
+    Larger,
+    Smaller,
+    UsualSize,
+    Search,
+    Keys,
+    Glossary,
+    About,
+}
+
+/// Name, keys and explanation of a command.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct About {
+    /// Its name, a verb first.
+    pub name: String,
+    /// Its keyboard shortcut.
+    pub keys: Option<KeyboardShortcut>,
+    /// What it does, if its name does not say it; other words by which it is found.
+    pub hint: &'static str,
+}
+
+impl Command {
+    /// Returns its name, keys and explanation.
+    pub fn about(&self) -> About {
+        let plain = |key| Some(KeyboardShortcut::new(Modifiers::NONE, key));
+        let ctrl = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND, key));
+        let shift = Modifiers::COMMAND | Modifiers::SHIFT;
+        let (name, keys, hint) = match self {
+            Self::Train => ("Train", ctrl(Key::Enter), "Start training a network."),
+            Self::TrainLonger => ("Train longer", None, "Continue from the current weights."),
+            Self::PauseTraining => ("Pause training", ctrl(Key::P), ""),
+            Self::ResumeTraining => ("Resume training", ctrl(Key::P), ""),
+            Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
+            Self::OpenFiles => ("Open files", None, "A recording, recipe, network or checkpoint."),
+            Self::PressMiddle => ("Press the middle of the surface", None, "Touch the sensor."),
+            Self::NextSample => ("Next test sample", plain(Key::PageDown), ""),
+            Self::PreviousSample => ("Previous test sample", plain(Key::PageUp), ""),
+            Self::Chart(name) => (*name, None, "Show this chart."),
+            Self::NextSection => ("Next section", plain(Key::CloseBracket), ""),
+            Self::PreviousSection => ("Previous section", plain(Key::OpenBracket), ""),
+            Self::SectionAlongColumns => ("Section along a column-wire", plain(Key::Backslash), ""),
+            Self::SectionAlongRows => ("Section along a row-wire", plain(Key::Backslash), ""),
+            Self::Begin(name) => (*name, ctrl(Key::Enter), "Start."),
+            Self::Cancel(name) => (*name, ctrl(Key::Period), "Stop; what has finished is kept."),
+            Self::CrossValidate => ("Cross-validate", None, "Test on every part of the samples."),
+            Self::Record => ("Start or end recording", ctrl(Key::R), "Write each frame to a file."),
+            Self::ReZero => ("Re-zero", None, "Take the present readings as those at rest."),
+            Self::PlayReplay => ("Pause or resume replay", ctrl(Key::P), ""),
+            Self::Export(name) => (name.as_str(), None, ""),
+            Self::Undo => ("Undo change of settings", ctrl(Key::Z), ""),
+            Self::Redo => (
+                "Redo change of settings",
+                Some(KeyboardShortcut::new(shift, Key::Z)),
+                "",
+            ),
+            Self::Show(view) => (view.name(), ctrl(view.key()), "Show this view."),
+            Self::Dark => ("Dark theme", None, ""),
+            Self::Light => ("Light theme", None, ""),
+            Self::Colours(map) => (map.name(), None, map.meaning()),
+            Self::LockHeights => ("Lock the scale of heights", None, "The same colours on every surface."),
+            Self::FreeHeights => ("Free the scale of heights", None, "Colours span the displayed heights."),
+            Self::FreeErrors => ("Free the scale of errors", None, "Colours span the displayed errors."),
+            Self::Larger => ("Larger interface", ctrl(Key::Plus), "Zoom in."),
+            Self::Smaller => ("Smaller interface", ctrl(Key::Minus), "Zoom out."),
+            Self::UsualSize => ("Reset the interface size", ctrl(Key::Num0), "Zoom to 100 %."),
+            Self::Search => ("Search actions", ctrl(Key::K), ""),
+            Self::Keys => ("Keys", plain(Key::Questionmark), "Help: every shortcut."),
+            Self::Glossary => ("Glossary", None, "Help: every term."),
+            Self::About => ("About Decoupler", None, "Version and licences."),
+        };
+        let before = match self {
+            Self::Chart(_) => "Chart: ",
+            Self::Colours(_) => "Colours: ",
+            Self::Show(_) => "Show ",
+            _ => "",
+        };
+        About {
+            name: format!("{before}{name}"),
+            keys,
+            hint,
+        }
+    }
+}
+
+/// A command that is listed now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Offer {
+    /// The command.
+    pub command: Command,
+    /// False if it is not available now.
+    pub is_possible: bool,
+}
+
+/// The commands of this frame. Whoever offers a command carries it out when [`Self::offer`] returns true: its keys were
+/// pressed, or it was picked.
+#[derive(Debug)]
+pub struct Offers<'a> {
+    /// Keys and pointer of the frame.
+    pub ctx: &'a Context,
+    /// False while a modal is open, which hears the keys.
+    pub is_heard: bool,
+    picked: Option<Command>,
+    list: Vec<Offer>,
+}
+
+impl<'a> Offers<'a> {
+    /// Nothing offered yet; `picked` is the command picked from the list or by a button.
+    pub fn new(ctx: &'a Context, picked: Option<Command>, is_heard: bool) -> Self {
+        Self {
+            ctx,
+            is_heard,
+            picked,
+            list: Vec::new(),
+        }
+    }
+
+    /// Offers a command. Returns true if the user invoked it.
+    pub fn offer(&mut self, command: Command, is_possible: bool) -> bool {
+        let is_picked = self.picked.take_if(|picked| *picked == command).is_some();
+        // Text being typed keeps its own keys.
+        let may_hear = |keys: &KeyboardShortcut| {
+            let is_for_typing = keys.modifiers.is_none() || matches!(keys.logical_key, Key::Z | Key::Y);
+            self.is_heard && is_possible && !(is_for_typing && self.ctx.text_edit_focused())
+        };
+        let keys = command.about().keys.filter(may_hear);
+        let is_pressed = keys.is_some_and(|keys| self.ctx.input_mut(|input| input.consume_shortcut(&keys)));
+        self.list.push(Offer { command, is_possible });
+        is_possible && (is_picked || is_pressed)
+    }
+
+    /// Returns the commands in the order in which they were offered.
+    pub fn into_list(self) -> Vec<Offer> {
+        self.list
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use eframe::egui::{Event, RawInput};
+
+    use super::*;
+
+    /// Returns what was offered and done in a frame in which these keys were pressed.
+    fn frame(picked: Option<Command>, keys: Option<(Modifiers, Key)>, is_heard: bool) -> (Vec<Offer>, [bool; 3]) {
+        let ctx = Context::default();
+        let press = |(modifiers, key)| Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers,
+        };
+        let input = RawInput {
+            events: keys.map(press).into_iter().collect(),
+            ..RawInput::default()
+        };
+        let mut found = None;
+        let mut output = ctx.run_ui(input, |ui| {
+            let mut offers = Offers::new(ui.ctx(), picked.clone(), is_heard);
+            let done = [
+                offers.offer(Command::Train, true),
+                offers.offer(Command::StopTraining, false),
+                offers.offer(Command::Dark, true),
+            ];
+            found.get_or_insert((offers.into_list(), done));
+        });
+        // Nothing is drawn.
+        output.textures_delta.clear();
+        found.unwrap()
+    }
+
+    #[test]
+    fn keys_and_the_list_do_a_command_once_and_only_that_one() {
+        let enter = Some((Modifiers::COMMAND, Key::Enter));
+        assert_eq!(frame(None, None, true).1, [false; 3]);
+        assert_eq!(frame(None, enter, true).1, [true, false, false]);
+        assert_eq!(frame(Some(Command::Dark), None, true).1, [false, false, true]);
+        assert_eq!(frame(Some(Command::Dark), None, false).1, [false, false, true]);
+        assert_eq!(frame(None, enter, false).1, [false; 3], "a modal hears the keys");
+    }
+
+    #[test]
+    fn an_unavailable_command_is_listed_and_not_done() {
+        let stop = Some((Modifiers::COMMAND, Key::Period));
+        let (offers, done) = frame(Some(Command::StopTraining), stop, true);
+        assert_eq!(done, [false; 3]);
+        let is_possible = offers.iter().map(|offer| offer.is_possible);
+        assert_eq!(is_possible.collect::<Vec<_>>(), [true, false, true]);
+    }
+}

@@ -1,0 +1,210 @@
+//! The look of surfaces, common to all views: camera, mode, colours and scales, with the controls that change it.
+
+use decoupler_core::problem::Channel;
+use decoupler_files::{
+    export::format_number,
+    figure::{
+        SequentialMap,
+        surface::{OrbitCamera, Quantity, Surface, ViewMode},
+    },
+};
+use eframe::egui::{
+    Align, Button, ComboBox, CursorIcon, Layout, Popup, Rect, Sense, Ui, UiBuilder, WidgetInfo, accesskit::Role, vec2,
+};
+
+use super::Effect;
+use crate::window::{
+    surface_view::{ColourBar, SurfaceViewResponse},
+    test_view::HeightScale,
+    theme::{Theme, rgb, space},
+    widgets::{dim_ui, section_heading_ui, segmented_ui},
+};
+
+/// Camera, mode and colours in which all views draw surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Shared by all surfaces.
+    pub camera: OrbitCamera,
+    /// In space or from above.
+    pub mode: ViewMode,
+    /// Dark or light.
+    pub is_dark: bool,
+    /// Colours of values that do not diverge.
+    pub colours: SequentialMap,
+    /// Range of heights that colours and axes span.
+    pub heights: HeightScale,
+    /// Error at the ends of the colour scale, in millimetres, while it is locked.
+    pub error_limit_mm: Option<f64>,
+}
+
+impl Look {
+    /// Returns a surface in this look. Its own range is that of a locked scale of values, or of a free one of errors.
+    pub fn dressed(&self, surface: &Surface, title: String) -> Surface {
+        let values = || {
+            surface
+                .nodes
+                .iter()
+                .map(|node| node.z)
+                .filter(|value| value.is_finite())
+        };
+        let extremes = values().reduce(f64::min).zip(values().reduce(f64::max));
+        let range = match (&surface.quantity, self.heights, self.error_limit_mm, extremes) {
+            (Quantity::Error, _, Some(limit_mm), _) => -limit_mm..=limit_mm,
+            // The resolution of heights is a nanometre.
+            (Quantity::Height, HeightScale::Fitted, _, Some((low, high))) => low..=high.max(low + 1e-6),
+            (Quantity::Target(_), HeightScale::Fitted, _, Some((low, high))) => low..=high,
+            _ => surface.range.clone(),
+        };
+        Surface {
+            title,
+            range,
+            mode: self.mode,
+            colours: self.colours,
+            ..surface.clone()
+        }
+    }
+}
+
+/// Surface shown for a network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RightCard {
+    /// The decoded surface.
+    #[default]
+    Decoupled,
+    /// Its difference from the actual one.
+    Error,
+}
+
+/// The choice between surfaces in space and from above.
+pub fn view_mode_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
+    let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
+    let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
+    effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+}
+
+/// Turns all surfaces as this one was turned, and marks the node under the pointer on its neighbours too.
+pub fn follow_surface(shown: &SurfaceViewResponse, look: Look, marked: &mut Option<usize>, effects: &mut Vec<Effect>) {
+    if shown.camera != look.camera {
+        let camera = shown.camera;
+        effects.push(Effect::Look(Look { camera, ..look }));
+    }
+    // Each card sets the mark only while the pointer is over it, so that it keeps the mark of the other card.
+    if shown.response.contains_pointer() && shown.hovered_node != *marked {
+        *marked = shown.hovered_node;
+        shown.response.ctx.request_repaint();
+    }
+}
+
+/// The list of targets behind `name`, where there are several.
+pub fn target_choice_ui(ui: &mut Ui, name: &str, id: &str, targets: &[Channel], target: &mut usize) {
+    *target = (*target).min(targets.len().saturating_sub(1));
+    if targets.len() < 2 {
+        return;
+    }
+    ui.horizontal(|ui| {
+        let label = ui.label(name);
+        let combo = ComboBox::from_id_salt(id).selected_text(targets[*target].title());
+        let picked = combo.show_ui(ui, |ui| {
+            for (index, of) in targets.iter().enumerate() {
+                ui.selectable_value(target, index, of.title());
+            }
+        });
+        picked.response.labelled_by(label.id);
+    });
+}
+
+/// The colour scale in `slot`. A click opens its options: the colour map, and whether the scale is locked. `note` is shown
+/// under the pointer.
+pub fn colour_scale_ui(ui: &mut Ui, slot: Rect, scale: &Surface, note: &str, look: Look, effects: &mut Vec<Effect>) {
+    let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
+    let theme = Theme::of(ui);
+    let bar = ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
+    let mut changed = look;
+    Popup::menu(&bar).show(|ui| {
+        // A menu justifies its lines.
+        ui.with_layout(Layout::top_down(Align::Min), |ui| {
+            ui.set_width(space(66));
+            colours_ui(ui, scale, &mut changed);
+            lock_ui(ui, scale, &mut changed);
+        });
+    });
+    let state = match scale.quantity {
+        Quantity::Height | Quantity::Target(_) if look.heights == HeightScale::Fitted => {
+            " It spans the displayed heights."
+        }
+        Quantity::Error if look.error_limit_mm.is_some() => " It is locked.",
+        _ => "",
+    };
+    let hint = format!("{note} Click to choose colours, or to lock or free the scale.{state}");
+    bar.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(hint);
+    if changed != look {
+        effects.push(Effect::Look(changed));
+    }
+}
+
+/// The colour maps, each with a sample; changes `look`.
+fn colours_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
+    /// Pieces of the sample of a colour map.
+    const PIECES: usize = 32;
+    if scale.quantity.is_diverging() {
+        dim_ui(
+            ui,
+            "Errors have the colour of the card at zero, blue below and orange above.",
+        );
+        return;
+    }
+    section_heading_ui(ui, "Colours");
+    for map in SequentialMap::ALL {
+        ui.horizontal(|ui| {
+            let button = Button::selectable(map == look.colours, map.name()).min_size(vec2(space(24), space(6)));
+            if ui.add(button).on_hover_text(map.meaning()).clicked() {
+                look.colours = map;
+            }
+            let (sample, _) = ui.allocate_exact_size(vec2(space(16), space(3)), Sense::hover());
+            let width = sample.width() / PIECES as f32;
+            for piece in 0..PIECES {
+                let left = sample.left() + width * piece as f32;
+                let part = Rect::from_x_y_ranges(left..=left + width, sample.y_range());
+                let colour = map.colours().at(piece as f32 / (PIECES - 1) as f32);
+                ui.painter().rect_filled(part, 0.0, rgb(colour));
+            }
+        });
+    }
+}
+
+/// The choice between a locked and a free scale, where there is one; changes `look`.
+fn lock_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
+    let limit_mm = *scale.range.end();
+    let keeps = format!("Keeps ± {} mm for whatever is shown next.", format_number(limit_mm));
+    let meanings = match scale.quantity {
+        Quantity::Height => [
+            "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.",
+            "Spans the displayed heights: small differences are visible, but colours are not comparable between plots.",
+        ],
+        Quantity::Target(_) => [
+            "Spans the values of all test samples: colours mean the same for every sample.",
+            "Spans the displayed values: small differences are visible, but colours are not comparable between plots.",
+        ],
+        Quantity::Error => [&*keeps, "Spans ± the largest displayed error."],
+        // The limit of errors is in millimetres, which these are not.
+        Quantity::Pattern | Quantity::Sensitivity | Quantity::TargetError(_) => return,
+    };
+    let is_locked = match scale.quantity {
+        Quantity::Error => look.error_limit_mm.is_some(),
+        _ => look.heights == HeightScale::Stroke,
+    };
+    section_heading_ui(ui, "Scale");
+    for ((locks, text), meaning) in [(true, "Locked"), (false, "Free")].into_iter().zip(meanings) {
+        let button = Button::selectable(locks == is_locked, text).min_size(vec2(space(24), space(6)));
+        let button = ui.add(button);
+        button.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, locks == is_locked, text));
+        if button.clicked() {
+            match (&scale.quantity, locks) {
+                (Quantity::Error, _) => look.error_limit_mm = locks.then_some(limit_mm),
+                (_, true) => look.heights = HeightScale::Stroke,
+                (_, false) => look.heights = HeightScale::Fitted,
+            }
+        }
+        dim_ui(ui, meaning);
+    }
+}

@@ -1,0 +1,438 @@
+//! The charts below the surfaces. Each is a value: its name, its figure, and what the points of the figure are. The source
+//! offers a list of them, and one card draws the chosen one.
+
+use decoupler_files::figure::{
+    Decoded, Figure, HeatMap, Ink, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
+    hysteresis_figure, loss_figure, node_figure, pair_address, pair_sample, regression_figure, sample_figure,
+    training_state_figure,
+};
+use eframe::egui::{Ui, UiBuilder};
+
+use super::{
+    press::readings_ui,
+    scrub::{self, scrub_bar_ui},
+    section::{Along, section_bar_ui, section_of},
+    view::TrainView,
+};
+use crate::window::{
+    plotting::{Pointer, cells_ui, plots_ui},
+    shared::{Command, Effect, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
+    test_view::{Positions, TargetCharts},
+    theme::{Theme, space},
+    widgets::{invitation_ui, tabs_ui},
+};
+
+/// A chart of the displayed result.
+#[derive(Debug)]
+pub(super) struct Chart {
+    /// Name of its tab.
+    pub name: &'static str,
+    /// What appears in it once a network is trained.
+    hint: &'static str,
+    /// Returns false while it has nothing to do with what is displayed.
+    is_offered: fn(&Shared) -> bool,
+    /// Returns its figure, once there is something to draw.
+    draw: fn(&TrainView, &Shared) -> Option<Figure>,
+    items: Items,
+    /// Shows what can be chosen in it.
+    bar_ui: fn(&mut Ui, &mut TrainView, &Shared),
+}
+
+/// What the points of a chart are, which respond to the pointer.
+#[derive(Clone, Copy, Debug)]
+enum Items {
+    /// They do not respond.
+    None,
+    /// Nodes, or targets of a recording: the one under the pointer lights up.
+    Nodes,
+    /// Values of the test set: a click goes to the snapshot and the node of one.
+    Values,
+}
+
+const BARE: Chart = Chart {
+    name: "",
+    hint: "",
+    is_offered: |_| true,
+    draw: |_, _| None,
+    items: Items::None,
+    bar_ui: |_, _, _| (),
+};
+
+const LOSS: Chart = Chart {
+    name: "Loss",
+    hint: "The error of each epoch appears here while the network trains.",
+    draw: |view, shared| {
+        let (run, result) = trained(view, shared)?;
+        let mut figure = loss_figure(run.outline.records(), &run.stages, result.best_epoch);
+        let past = view.scrub.epoch().map(|epoch| LineAt::X(epoch as f64));
+        add_line(&mut figure, "displayed network", past);
+        Some(figure.into())
+    },
+    ..BARE
+};
+
+const TRAINING_STATE: Chart = Chart {
+    name: "Training state",
+    hint: "The gradient and the method's own quantities appear here while the network trains.",
+    draw: |view, shared| {
+        let (run, _) = trained(view, shared)?;
+        Some(training_state_figure(run.outline.records(), &run.stages).into())
+    },
+    ..BARE
+};
+
+const HISTOGRAM: Chart = Chart {
+    name: "Histogram",
+    hint: "The distribution of the z errors in the test set appears here.",
+    draw: |view, shared| {
+        let mut figure = histogram_figure(view.drawn.pairs()?, None, decoded(view, shared)?);
+        let name = match shared.recorded_test() {
+            None => "node under the pointer",
+            Some(_) => "displayed sample",
+        };
+        let lit = lit_value(view, shared).map(|[actual, decoded]| LineAt::X(decoded - actual));
+        add_line(&mut figure, name, lit);
+        Some(figure.into())
+    },
+    bar_ui: target_bar_ui,
+    ..BARE
+};
+
+const REGRESSION: Chart = Chart {
+    name: "Regression",
+    hint: "Decoded against actual z of every node in the test set appears here.",
+    draw: |view, shared| {
+        let pairs = view.drawn.pairs()?;
+        let line = match shared.recorded_test() {
+            None => RegressionLine::of(pairs.iter().copied()),
+            Some(test) => *target_charts(view, shared)?.lines.get(view.target_of(test))?,
+        };
+        let figure = regression_figure((pairs.len(), &|pair| pairs[pair]), &line, decoded(view, shared)?);
+        Some(figure.lighting(|_| false, lit_value(view, shared).as_slice()).into())
+    },
+    items: Items::Values,
+    bar_ui: target_bar_ui,
+    ..BARE
+};
+
+const HYSTERESIS: Chart = Chart {
+    name: "Hysteresis",
+    hint: "Mean decoded against actual values appear here, loading and unloading apart, for a target that rises and falls.",
+    is_offered: |shared| {
+        let charts = shared.result().and_then(|result| result.charts.as_ref());
+        charts.is_some_and(|charts| charts.loops.iter().any(Option::is_some))
+    },
+    draw: |view, shared| {
+        let test = shared.recorded_test()?;
+        let target = view.target_of(test);
+        let found = target_charts(view, shared)?.loops.get(target)?.as_ref()?;
+        Some(hysteresis_figure(found, test.problem.targets.get(target)?).into())
+    },
+    bar_ui: target_bar_ui,
+    ..BARE
+};
+
+/// All targets of the sample, actual and decoded. Without surfaces it takes their place.
+pub(super) const SAMPLE: Chart = Chart {
+    name: "Sample",
+    is_offered: has_target_surface,
+    draw: |view, shared| {
+        let (test, result) = (shared.recorded_test()?, view.result(shared)?);
+        let values = |values: ndarray::ArrayView2<'_, f64>| {
+            let is_there = view.snapshot < values.nrows();
+            is_there.then(|| values.row(view.snapshot).to_vec())
+        };
+        let [actual, decoded] = [values(test.set.targets())?, values(result.answers.view())?];
+        Some(sample_figure(&test.problem.targets, &actual, &decoded, &test.ranges).into())
+    },
+    items: Items::Nodes,
+    ..BARE
+};
+
+const ERROR_MAP: Chart = Chart {
+    name: "Error map",
+    is_offered: |shared| {
+        let charts = shared.result().and_then(|result| result.charts.as_ref());
+        charts.is_some_and(|charts| charts.error_map.is_some())
+    },
+    draw: |view, shared| {
+        let map = target_charts(view, shared)?.error_map.as_ref()?;
+        Some(HeatMap::clone(map).coloured(shared.look.colours).into())
+    },
+    ..BARE
+};
+
+/// The paper's Fig. 6.
+pub(super) const NODES: Chart = Chart {
+    name: "Nodes",
+    draw: |view, shared| {
+        let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
+        let drawing = view.drawing()?;
+        let decoded_mm = drawing.decoded.as_ref().map(|[decoded, _]| &*decoded.nodes);
+        let bars_mm = view.has_error_bars.then(|| view.drawn.spread_mm()).flatten();
+        Some(node_figure(&drawing.actual.nodes, decoded_mm, bars_mm, nodes_per_row).into())
+    },
+    items: Items::Nodes,
+    bar_ui: |ui, view, shared| {
+        if shared.result().is_some() {
+            let hint = "± the root mean square error of each node over all snapshots of the test set, in mm.";
+            ui.checkbox(&mut view.has_error_bars, "Error bars").on_hover_text(hint);
+        }
+    },
+    ..BARE
+};
+
+pub(super) const SECTION: Chart = Chart {
+    name: "Section",
+    draw: |view, shared| Some(section_of(&view.section, shared.test()?, view.drawing()?, shared.look).into()),
+    items: Items::Nodes,
+    bar_ui: |ui, view, shared| {
+        if let Some(test) = shared.test() {
+            section_bar_ui(ui, &mut view.section, test);
+        }
+    },
+    ..BARE
+};
+
+/// The readings, if there is no room for their own card.
+const READINGS: Chart = Chart {
+    name: "Readings",
+    ..BARE
+};
+
+const OF_ARRAY: [Chart; 7] = [LOSS, TRAINING_STATE, HISTOGRAM, REGRESSION, NODES, SECTION, READINGS];
+
+const OF_RECORDING: [Chart; 7] = [
+    LOSS,
+    TRAINING_STATE,
+    Chart {
+        hint: "The distribution of the errors of each target in the test set appears here.",
+        ..HISTOGRAM
+    },
+    Chart {
+        hint: "Decoded against actual values of each target in the test set appear here.",
+        ..REGRESSION
+    },
+    HYSTERESIS,
+    SAMPLE,
+    ERROR_MAP,
+];
+
+/// Returns the charts of the current source, including the readings unless they have their own card.
+fn charts(shared: &Shared, has_readings: bool) -> impl Iterator<Item = &'static Chart> {
+    let all: &'static [Chart] = match shared.source {
+        SourceKind::Array => &OF_ARRAY,
+        SourceKind::Recording => &OF_RECORDING,
+    };
+    let is_offered = move |chart: &&Chart| chart.name != READINGS.name || has_readings;
+    all.iter().filter(is_offered).filter(|chart| (chart.is_offered)(shared))
+}
+
+/// Returns the name and the figure of the displayed chart; no figure before there is anything to draw.
+pub(super) fn shown_chart(view: &TrainView, shared: &Shared) -> (&'static str, Option<Figure>) {
+    let chart = charts(shared, true).find(|chart| chart.name == view.tab);
+    let chart = chart.unwrap_or(&LOSS);
+    (chart.name, chart.figure(view, shared))
+}
+
+impl Chart {
+    /// Returns its figure with the lit items highlighted.
+    pub(super) fn figure(&self, view: &TrainView, shared: &Shared) -> Option<Figure> {
+        let figure = (self.draw)(view, shared)?;
+        Some(match (self.items, figure) {
+            (Items::Nodes, Figure::Plots(plots)) => {
+                let lit = lit_nodes(view, shared);
+                let is_lit = |item| Some(item) == view.lights.node || lit.contains(&item);
+                plots.lighting(is_lit, &[]).into()
+            }
+            (_, figure) => figure,
+        })
+    }
+
+    /// Shows its figure in the remaining space. Lights up the item under the pointer, and handles a click there.
+    pub(super) fn figure_ui(&self, ui: &mut Ui, figure: &Figure, view: &mut TrainView, shared: &Shared) {
+        let plots = match figure {
+            Figure::Plots(plots) => plots,
+            Figure::HeatMap(map) => {
+                let marked = (&[][..], &[][..], Theme::of(ui).palette.warning);
+                if let Some((cell, response)) = cells_ui(ui, "Error over the position", map, marked) {
+                    response.on_hover_text_at_pointer(&map.notes[cell]);
+                }
+                return;
+            }
+            Figure::Surfaces(_) => return,
+        };
+        // Each chart is zoomed by itself.
+        let drawn = plots_ui(ui, self.name, plots, Pointer::Moves);
+        let Some(plot) = drawn.iter().find(|plot| plot.has_pointer) else {
+            return;
+        };
+        let place = |item: Option<usize>| place_of_value(view, shared, item?);
+        match self.items {
+            Items::None => {}
+            Items::Nodes => view.lights.node = plot.hovered,
+            Items::Values => {
+                // The values are those of the test set, not of a pressed surface.
+                let here = place(plot.hovered).filter(|(snapshot, _)| *snapshot == view.snapshot);
+                let (here, clicked) = (here.filter(|_| !view.press.is_pressing()), place(plot.clicked));
+                view.lights.node = here.and_then(|(_, node)| node);
+                if let Some((snapshot, node)) = clicked {
+                    view.go_to(snapshot, node);
+                }
+            }
+        }
+    }
+}
+
+fn trained<'a>(view: &'a TrainView, shared: &'a Shared) -> Option<(&'a RunView, &'a RunResult)> {
+    shared.shown_run().zip(view.result(shared))
+}
+
+fn target_charts<'a>(view: &'a TrainView, shared: &'a Shared) -> Option<&'a TargetCharts> {
+    view.result(shared)?.charts.as_deref()
+}
+
+/// What the values of the test set are: z of the nodes, or those of the displayed target.
+fn decoded<'a>(view: &TrainView, shared: &'a Shared) -> Option<Decoded<'a>> {
+    match shared.recorded_test() {
+        None => Some(Decoded::Nodes),
+        Some(test) => Some(Decoded::Target(test.problem.targets.get(view.target_of(test))?)),
+    }
+}
+
+fn add_line(figure: &mut PlotFigure, name: &str, at: Option<LineAt>) {
+    if let (Some(at), Some(plot)) = (at, figure.plots.first_mut()) {
+        plot.series
+            .push(Series::across(name, at, Ink::Orange, LineStyle::Solid));
+    }
+}
+
+/// Returns the snapshot and the node of one of the values of the test set; for a recording the sample and the target.
+fn place_of_value(view: &TrainView, shared: &Shared, value: usize) -> Option<(usize, Option<usize>)> {
+    if let Some(test) = shared.test() {
+        let address = pair_address(&test.set, value)?;
+        return Some((address.snapshot, test.node(address)));
+    }
+    let test = shared.recorded_test()?;
+    Some((pair_sample(&test.set, value)?, Some(view.target_of(test))))
+}
+
+/// Returns the actual and decoded value that are highlighted among those of the test set: those of the lit node, or for a
+/// recording those of the displayed target and sample.
+fn lit_value(view: &TrainView, shared: &Shared) -> Option<[f64; 2]> {
+    if let Some(test) = shared.recorded_test() {
+        let at = [view.snapshot, view.target_of(test)];
+        let answers = &view.result(shared)?.answers;
+        return Some([*test.set.targets().get(at)?, *answers.get(at)?]);
+    }
+    let (drawing, node) = (view.drawing()?, view.lights.node?);
+    let [decoded, _] = drawing.decoded.as_ref()?;
+    Some([drawing.actual.nodes.get(node)?.z, decoded.nodes.get(node)?.z])
+}
+
+/// Returns the nodes of the row-wire that is pointed at, which are lit together.
+pub(super) fn lit_nodes(view: &TrainView, shared: &Shared) -> Vec<usize> {
+    let per_row = shared.test().map_or(0, |test| test.sensor.scale.nodes_per_row());
+    let row = view.lights.row.into_iter();
+    row.flat_map(|row| row * per_row..(row + 1) * per_row).collect()
+}
+
+/// Returns true if a surface goes through the displayed targets of the recording.
+pub(super) fn has_target_surface(shared: &Shared) -> bool {
+    let test = shared.recorded_test();
+    test.is_some_and(|test| matches!(test.positions, Positions::Surface(_)))
+}
+
+/// The choice of the target, where there are several.
+fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    if let Some(test) = shared.recorded_test().filter(|_| shared.result().is_some()) {
+        let targets = &test.problem.targets;
+        target_choice_ui(ui, "Target", "target of the charts", targets, &mut view.target);
+    }
+}
+
+/// The charts below the surfaces, including the readings unless they have their own card, and the bar that goes through
+/// past epochs.
+pub fn charts_card_ui(
+    ui: &mut Ui,
+    view: &mut TrainView,
+    shared: &Shared,
+    has_readings: bool,
+    effects: &mut Vec<Effect>,
+) {
+    /// Width of a card below which the longest name of a tab is cut.
+    const NARROW: f32 = space(106);
+    let is_narrow = ui.available_width() < NARROW;
+    let offered = Vec::from_iter(charts(shared, has_readings));
+    let chart = offered
+        .iter()
+        .copied()
+        .find(|chart| chart.name == view.tab)
+        .unwrap_or(&LOSS);
+    let tabs = offered.iter().map(|chart| match chart.name {
+        "Training state" if is_narrow => (chart.name, "State"),
+        name => (name, name),
+    });
+    view.tab = tabs_ui(ui, "Charts", &Vec::from_iter(tabs), chart.name).unwrap_or(chart.name);
+    (chart.bar_ui)(ui, view, shared);
+    let past = shared.shown_run().map(|run| &run.past);
+    let past = past.filter(|past| past.epochs().len() > 1);
+    let mut place = ui.available_rect_before_wrap();
+    if past.is_some() {
+        place.max.y -= scrub::HEIGHT;
+    }
+    ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
+        let is_possible = !shared.phase.is_busy();
+        if chart.name == READINGS.name {
+            readings_of_view_ui(ui, view, shared);
+        } else if let Some(figure) = chart.figure(view, shared) {
+            chart.figure_ui(ui, &figure, view, shared);
+        } else if invitation_ui(ui, chart.hint, "Train now", is_possible) {
+            effects.push(Effect::Train);
+        }
+    });
+    if let Some(past) = past {
+        scrub_bar_ui(ui, &mut view.scrub, past);
+    }
+}
+
+/// Readings of the displayed surface. The one under the pointer lights up its nodes; a click cuts the surfaces along its
+/// wires.
+pub fn readings_of_view_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    let per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
+    let row = view.lights.row.or(view.lights.node.map(|node| node / per_row));
+    let pointed = readings_ui(ui, view.drops_percent(), shared.test(), row, shared.look.colours);
+    view.lights.row = pointed.as_ref().map(|pointed| pointed.cell[0]);
+    if let Some(pointed) = pointed.filter(|pointed| pointed.is_clicked) {
+        view.section.choose(pointed.cell);
+        view.tab = SECTION.name;
+    }
+}
+
+impl TrainView {
+    /// Offers each chart, and the steps through sections.
+    pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
+        // The readings have their own card if there is room.
+        for chart in charts(shared, false) {
+            if offers.offer(Command::Chart(chart.name), chart.name != self.tab) {
+                self.tab = chart.name;
+            }
+        }
+        let Some(test) = shared.test().filter(|_| self.tab == SECTION.name) else {
+            return;
+        };
+        for (by, command) in [(-1, Command::PreviousSection), (1, Command::NextSection)] {
+            let stepped = self.section.stepped(by, test);
+            if offers.offer(command, stepped.is_some()) {
+                self.section = stepped.unwrap_or(self.section);
+            }
+        }
+        let (command, other) = match self.section.along {
+            Along::RowWires => (Command::SectionAlongColumns, Along::ColumnWires),
+            Along::ColumnWires => (Command::SectionAlongRows, Along::RowWires),
+        };
+        if offers.offer(command, true) {
+            self.section.along = other;
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! The pressed sensor, and its answer by the network.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use decoupler_core::{
+    dataset::Dataset,
+    decoupling::{Decoder, decode_set},
+    evaluation::{Errors, RunSettings},
+    network::Networks,
+};
+use glam::DVec2;
+use ndarray::Array2;
+
+use super::Finger;
+use crate::window::test_view::{Drawing, TestView};
+
+/// The network that decodes the touch.
+#[derive(Clone, Debug)]
+pub(super) struct Subject {
+    /// The network, or one for each row.
+    pub(super) networks: Arc<Networks>,
+    /// Settings that it was trained with.
+    pub(super) settings: RunSettings,
+    /// True for the built-in one.
+    pub(super) is_demo: bool,
+    /// True once it no longer changes.
+    pub(super) is_idle: bool,
+}
+
+/// Everything that a touch and the network's answer depend on.
+#[derive(Clone, Debug)]
+pub(super) struct Question {
+    pub(super) finger: Finger,
+    pub(super) place_mm: DVec2,
+    pub(super) test: TestView,
+    pub(super) subject: Option<Subject>,
+}
+
+impl Question {
+    /// Returns true if both questions are the same.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        self.is_of(&other.test) && self.key() == other.key()
+    }
+
+    /// Returns true if it is about this sensor, with the same rows and stroke: a new training has another test set of the
+    /// same sensor.
+    pub(super) fn is_of(&self, test: &TestView) -> bool {
+        (self.test.sensor, self.test.stroke_mm) == (test.sensor, test.stroke_mm) && self.test.rows == test.rows
+    }
+
+    fn key(&self) -> (Finger, DVec2, Option<*const Networks>) {
+        let networks = self.subject.as_ref().map(|subject| Arc::as_ptr(&subject.networks));
+        (self.finger, self.place_mm, networks)
+    }
+}
+
+/// What is shown of a touch.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// The pressed sensor: a test set of one snapshot, without noise.
+    pub(super) pressed: TestView,
+    /// Its surface, the network's, and their difference.
+    pub drawing: Drawing,
+    /// Drops of its readings below those at rest, in percent: rows read × M4.
+    pub drops_percent: Option<Array2<f64>>,
+    /// The network's answer, if there is a network, or why it has none.
+    pub(super) answer: Option<Result<Answer, String>>,
+    /// Number of readings outside the range of the network's training.
+    pub(super) outside: usize,
+}
+
+/// Answer of a decoder to a pressed sensor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Answer {
+    pub(super) errors: Errors,
+    /// Time to decode the frame: the shortest of several, since other load on the machine can only increase it.
+    pub(super) time: Duration,
+}
+
+/// Presses, reads and decodes.
+pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
+    let shown = press(&question).map(|pressed| {
+        let networks = question.subject.as_ref().map(|subject| &*subject.networks);
+        let decoded = networks.map(|networks| decode(&mut networks.decoder(), &pressed));
+        let answers = decoded.as_ref().and_then(|decoded| decoded.as_ref().ok());
+        Shown {
+            drawing: pressed.drawing(answers.map(|(answers, _)| answers), 0),
+            drops_percent: pressed.drops_percent(&pressed.readings_ohm(0)),
+            answer: decoded.map(|decoded| decoded.map(|(_, answer)| answer)),
+            outside: networks.map_or(0, |networks| outside(networks, &pressed.set)),
+            pressed,
+        }
+    });
+    (question, shown)
+}
+
+/// Returns the sensor pressed: positions of its nodes, and readings of its wires by Eq. (2).
+fn press(question: &Question) -> Result<TestView, String> {
+    let Question {
+        finger, place_mm, test, ..
+    } = question;
+    let (sensor, rows) = (&test.sensor, &test.rows);
+    let depth_mm = finger.depth_share * test.stroke_mm;
+    let deformation = finger.indenter().press(sensor, *place_mm, depth_mm);
+    let (mut readings_ohm, mut places_mm) = (Vec::new(), Vec::new());
+    for &row in rows {
+        let readings = sensor.row_resistances(row, deformation.row_mm(row));
+        readings_ohm.extend(readings.map_err(|error| error.to_string())?);
+        places_mm.extend(
+            deformation
+                .row_positions_mm(sensor, row)
+                .flat_map(|place| place.to_array()),
+        );
+    }
+    let [readings_ohm, places_mm] = [readings_ohm, places_mm].map(|values| {
+        let shape = (rows.len(), values.len() / rows.len().max(1));
+        Array2::from_shape_vec(shape, values).expect("every row has as many values")
+    });
+    let set = Dataset::new(readings_ohm, places_mm, Some(rows), vec![0; rows.len()]);
+    let set = Arc::new(set.map_err(|error| error.to_string())?);
+    Ok(TestView {
+        snapshots: Arc::new(set.snapshots()),
+        set,
+        ..test.clone()
+    })
+}
+
+/// Decodes a pressed sensor; the answers are rows read × 3·M2.
+pub(super) fn decode(decoder: &mut dyn Decoder, pressed: &TestView) -> Result<(Array2<f64>, Answer), String> {
+    /// Number of repeats.
+    const REPEATS: usize = 4;
+    /// Maximum time spent on the repeats.
+    const LONGEST: Duration = Duration::from_millis(30);
+    let mut timed = || {
+        let begun = Instant::now();
+        let answers = decode_set(decoder, &pressed.set).map_err(|error| error.to_string())?;
+        Ok::<_, String>((answers, begun.elapsed()))
+    };
+    let begun = Instant::now();
+    let (answers, mut time) = timed()?;
+    for _ in 0..REPEATS {
+        if begun.elapsed() < LONGEST {
+            time = time.min(timed()?.1);
+        }
+    }
+    let errors = Errors::measure(&pressed.set, &answers, pressed.stroke_mm);
+    Ok((answers, Answer { errors, time }))
+}
+
+/// Number of readings outside the range that the networks were trained in.
+fn outside(networks: &Networks, pressed: &Dataset) -> usize {
+    let of_sample = |sample| {
+        let inputs = networks.at(pressed.row_index(sample)).inputs();
+        let range = inputs.range();
+        range.map_or(0, |range| {
+            range
+                .outside(inputs.quantity(), pressed.sample_readings(sample))
+                .count()
+        })
+    };
+    (0..pressed.samples()).map(of_sample).sum()
+}

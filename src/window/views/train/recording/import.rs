@@ -1,0 +1,344 @@
+//! The import that is edited: its plan, and the inspection of its files.
+
+use std::{
+    collections::BTreeMap,
+    iter::once,
+    ops::Range,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use decoupler_core::dataset::SplitBy;
+use decoupler_files::import::{FileSet, Format, InspectedFile, Meaning, Plan, Recipe};
+
+/// A column by its file and its name there, which do not change when another file becomes the first.
+type ColumnKey = (PathBuf, String);
+
+/// Plan of an import, with the inspection of its files.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Import {
+    /// The plan, with absolute paths. Readers share it: an edit makes a new one.
+    pub(super) plan: Arc<Plan>,
+    /// The files, the first with the rows to which the others are joined, with the meanings of their columns in the plan.
+    pub(super) files: Vec<InspectedFile>,
+    /// Meanings that the user or a recipe gave, kept when the files are read in another way.
+    chosen: BTreeMap<ColumnKey, Meaning>,
+    /// Units, likewise.
+    units: BTreeMap<ColumnKey, String>,
+    /// File and name of a variable whose rows are to be the samples, and the meaning that its columns get.
+    pub(super) wanted: Option<(usize, String, Meaning)>,
+}
+
+impl Import {
+    /// The import of a suggested plan whose files have been inspected.
+    pub(super) fn suggested(plan: Plan, files: Vec<InspectedFile>) -> Self {
+        Self {
+            plan: Arc::new(plan),
+            files,
+            ..Self::default()
+        }
+    }
+
+    /// The import of a recipe: nothing in it is a guess.
+    pub(super) fn of_recipe(plan: Plan, files: Vec<InspectedFile>) -> Self {
+        let mut import = Self::suggested(plan, files);
+        for file in &import.files {
+            for (column, meaning) in file.meanings.iter().enumerate() {
+                import.chosen.insert(key(file, column), *meaning);
+                let unit = import.plan.import.units.get(&file.full_name(column));
+                import.units.extend(unit.map(|unit| (key(file, column), unit.clone())));
+            }
+        }
+        import
+    }
+
+    /// Returns a plan with other files and roles, and everything else as in this import.
+    pub(super) fn merged(&self, found: Plan) -> Plan {
+        let older = &self.plan.import;
+        let mut import = Recipe {
+            data: found.import.data,
+            join: found.import.join,
+            append: found.import.append,
+            inputs: found.import.inputs,
+            targets: found.import.targets,
+            time: found.import.time,
+            group: found.import.group,
+            row_wire: found.import.row_wire,
+            positions: found.import.positions.or_else(|| older.positions.clone()),
+            ..older.clone()
+        };
+        for joined in &mut import.join {
+            if let Some(before) = older.join.iter().find(|before| before.file == joined.file) {
+                joined.limit = before.limit;
+                joined.stem.clone_from(&before.stem);
+            }
+        }
+        let mut renamed = BTreeMap::new();
+        for (path, stem) in paths_and_stems(&import) {
+            if let Some(file) = self.files.iter().find(|file| file.path == path) {
+                let mut now = file.clone();
+                now.stem = stem;
+                renamed.extend(names(file, |_| true).into_iter().zip(names(&now, |_| true)));
+            }
+        }
+        for condition in &mut import.conditions {
+            *condition = condition.clone().renamed(|name| renamed.get(name).cloned());
+        }
+        for column in import.missing.iter_mut().filter_map(|missing| missing.column.as_mut()) {
+            *column = renamed.get(column).unwrap_or(column).clone();
+        }
+        let columns = self.files.iter().flat_map(|file| names(file, |_| true));
+        columns.for_each(|name| drop(import.units.remove(&name)));
+        let paths = Vec::from_iter(paths_and_stems(&import).map(|(path, _)| path.to_owned()));
+        let test = self.plan.test.as_ref().and_then(|test| self.matching(test, &paths));
+        Plan {
+            import,
+            test: found.test.or(test),
+            division: self.plan.division,
+        }
+    }
+
+    /// Returns this suggestion with the choices in an `older` import, as far as they fit the files.
+    pub(super) fn keeping(mut self, older: Self) -> Self {
+        self.plan = Arc::new(older.merged(Arc::unwrap_or_clone(self.plan)));
+        (self.chosen, self.units) = (older.chosen, older.units);
+        for file in 0..self.files.len() {
+            for column in 0..self.files[file].columns.len() {
+                let key = key(&self.files[file], column);
+                if let Some(&meaning) = self.chosen.get(&key) {
+                    self.give(file, column, meaning);
+                }
+                if let Some(unit) = self.units.get(&key).cloned() {
+                    self.set_unit(file, column, &unit);
+                }
+            }
+        }
+        self.write_meanings(older.plan.import.has_groups());
+        if let Some((file, name, meaning)) = older.wanted
+            && let mut variables = self.files.get(file).into_iter().flat_map(|file| &file.variables)
+            && let Some(variable) = variables.find(|variable| variable.name == name)
+        {
+            let columns = variable.columns.clone();
+            self.set_meanings(file, columns, meaning);
+        }
+        self
+    }
+
+    /// Full names of the columns in use; in the file with a variable that is wanted, only that.
+    pub(super) fn used(&self) -> Vec<String> {
+        let of_file = |(number, file): (usize, &InspectedFile)| match &self.wanted {
+            Some((of_file, name, _)) if *of_file == number => {
+                let stem = file.stem.iter().chain([name]);
+                vec![Vec::from_iter(stem.map(String::as_str)).join(".")]
+            }
+            _ => names(file, |meaning| meaning != Meaning::Unused),
+        };
+        self.files.iter().enumerate().flat_map(of_file).collect()
+    }
+
+    /// Returns the layout of each text file, as a sentence.
+    pub(super) fn text_formats(&self) -> Vec<String> {
+        let text = self.files.iter().filter_map(|file| match &file.format {
+            Format::Text(dialect) => Some(format!("{}: {dialect}.", file_name(&file.path))),
+            _ => None,
+        });
+        text.collect()
+    }
+
+    /// Returns the files of `set`, which correspond to those of this import, for the recordings at `paths`, up to the first that
+    /// has none.
+    pub(super) fn matching(&self, set: &FileSet, paths: &[PathBuf]) -> Option<FileSet> {
+        let own = self.paths();
+        let mut files = paths.iter().map_while(|path| {
+            let found = own.iter().zip(set.files()).find(|(other, _)| *other == path);
+            found.map(|(_, file)| file.clone())
+        });
+        Some(FileSet {
+            data: files.next()?,
+            join: files.collect(),
+            append: set.append.clone(),
+        })
+    }
+
+    /// The plan, to be edited.
+    pub(super) fn edit(&mut self) -> &mut Plan {
+        Arc::make_mut(&mut self.plan)
+    }
+
+    /// Gives these columns of a file a meaning; if only one column can have it, the previous one loses it. Several columns get
+    /// it only if they can be used and have no special meaning.
+    pub(super) fn set_meanings(&mut self, file: usize, columns: Range<usize>, meaning: Meaning) {
+        let had_groups = self.plan.import.has_groups();
+        let is_single = columns.len() == 1;
+        for column in columns {
+            let (summary, before) = (&self.files[file].columns[column], self.files[file].meanings[column]);
+            let may_be_used = summary.min.is_some() && summary.texts == 0 && !summary.is_constant;
+            let is_plain = [Meaning::Input, Meaning::Target, Meaning::Unused].contains(&before);
+            if is_single || (is_plain && (may_be_used || meaning == Meaning::Unused)) {
+                self.give(file, column, meaning);
+            }
+        }
+        self.write_meanings(had_groups);
+    }
+
+    fn give(&mut self, file: usize, column: usize, meaning: Meaning) {
+        for (number, other) in self.files.iter_mut().enumerate() {
+            let is_taken = match meaning {
+                Meaning::Time => number == file,
+                Meaning::Group | Meaning::RowWire => true,
+                Meaning::Input | Meaning::Target | Meaning::Unused => false,
+            };
+            for column in 0..other.meanings.len() {
+                if is_taken && other.meanings[column] == meaning {
+                    other.meanings[column] = Meaning::Unused;
+                    self.chosen.insert(key(other, column), Meaning::Unused);
+                }
+            }
+        }
+        self.files[file].meanings[column] = meaning;
+        self.chosen.insert(key(&self.files[file], column), meaning);
+    }
+
+    /// Writes the meanings of the columns into the plan. The samples are divided by group if there are groups now.
+    fn write_meanings(&mut self, had_groups: bool) {
+        let of = |meaning| {
+            let named = self.files.iter().flat_map(|file| names(file, |other| other == meaning));
+            Vec::from_iter(named)
+        };
+        let (inputs, targets) = (of(Meaning::Input), of(Meaning::Target));
+        let (group, row_wire) = (of(Meaning::Group).pop(), of(Meaning::RowWire).pop());
+        // Without times in every file, rows belong together by their numbers.
+        let times: Option<Vec<String>> = self.files.iter().map(time).collect();
+        let mut times = times.into_iter().flatten();
+        let Plan { import, division, .. } = self.edit();
+        (import.inputs, import.targets, import.group, import.row_wire) = (inputs, targets, group, row_wire);
+        import.time = times.next();
+        import.join.iter_mut().for_each(|joined| joined.time = times.next());
+        match (had_groups, import.has_groups()) {
+            (false, true) => division.by = SplitBy::Group,
+            (_, false) if division.by == SplitBy::Group => division.by = SplitBy::Time,
+            _ => {}
+        }
+    }
+
+    /// Returns the number of columns of this meaning.
+    pub(super) fn count(&self, meaning: Meaning) -> usize {
+        let meanings = self.files.iter().flat_map(|file| &file.meanings);
+        meanings.filter(|other| **other == meaning).count()
+    }
+
+    /// Returns the unit of a column, as given or in the header.
+    pub(super) fn unit(&self, file: usize, column: usize) -> String {
+        let given = self.units.get(&key(&self.files[file], column));
+        let found = self.files[file].columns[column].unit.as_ref();
+        given.or(found).cloned().unwrap_or_default()
+    }
+
+    /// Gives a column a unit; none if it is empty or that of the header.
+    pub(super) fn set_unit(&mut self, file: usize, column: usize, unit: &str) {
+        let file = &self.files[file];
+        let (key, name, unit) = (key(file, column), file.full_name(column), unit.trim());
+        let is_given = !unit.is_empty() && file.columns[column].unit.as_deref() != Some(unit);
+        self.edit().import.units.remove(&name);
+        self.units.remove(&key);
+        if is_given {
+            self.edit().import.units.insert(name, unit.to_owned());
+            self.units.insert(key, unit.to_owned());
+        }
+    }
+
+    /// Returns the paths of the first recording and of those joined to it.
+    pub(super) fn paths(&self) -> Vec<PathBuf> {
+        paths_and_stems(&self.plan.import)
+            .map(|(path, _)| path.to_owned())
+            .collect()
+    }
+
+    /// Returns the files for the test that are given, each with the recording that it replaces.
+    pub(super) fn tests(&self) -> Vec<(PathBuf, PathBuf)> {
+        let tests = self.plan.test.iter().flat_map(FileSet::files);
+        self.paths().into_iter().zip(tests.cloned()).collect()
+    }
+
+    /// Adds a file of test samples for the first recording that has none. With a single recording its test file is replaced.
+    ///
+    /// # Errors
+    /// If it cannot be one; the message says what to do.
+    pub(super) fn add_test_file(&mut self, path: PathBuf) -> Result<(), String> {
+        let (name, recordings, given) = (file_name(&path), self.paths(), self.tests().len());
+        let count = recordings.len();
+        if count > 1 && given == count {
+            return Err(format!(
+                "{name} was not opened: each of the {count} recordings already has a file for the test. To use others, close \
+                 those files first."
+            ));
+        }
+        // The same file may be joined to both: its times distinguish its rows.
+        let is_first = given == 0 || count == 1;
+        if is_first && recordings[0] == path {
+            return Err(format!(
+                "{name} is trained on, so it cannot be a test file: choose a separate recording for the test."
+            ));
+        }
+        let test = self.edit().test.get_or_insert_default();
+        if is_first {
+            test.data = path;
+        } else {
+            test.join.push(path);
+        }
+        Ok(())
+    }
+
+    /// Closes one of the files whose rows follow those of the first, with the files joined to it.
+    pub(super) fn close_appended(&mut self, number: usize) {
+        self.edit().import.append.remove(number);
+        self.write_meanings(true);
+    }
+
+    /// Returns the reason why there is nothing to train on yet, with what to do.
+    pub(super) fn obstacle(&self) -> Option<String> {
+        if self.plan.test.is_some()
+            && let Some(recording) = self.paths().get(self.tests().len())
+        {
+            return Some(format!(
+                "{} has no file for the test yet: choose it with “Test file…” under “Samples”, or close the other files of \
+                 the test.",
+                file_name(recording)
+            ));
+        }
+        let needed = [(Meaning::Input, "an input"), (Meaning::Target, "a target")];
+        let lacking = needed.into_iter().find(|(meaning, _)| self.count(*meaning) == 0);
+        lacking.map(|(_, what)| format!("No column is {what}: choose one in the table of columns."))
+    }
+}
+
+fn key(file: &InspectedFile, column: usize) -> ColumnKey {
+    (file.path.clone(), file.columns[column].name.clone())
+}
+
+/// Full names of the columns of a file with some meanings.
+fn names(file: &InspectedFile, is_wanted: impl Fn(Meaning) -> bool) -> Vec<String> {
+    let columns = (0..file.columns.len()).filter(|&column| is_wanted(file.meanings[column]));
+    columns.map(|column| file.full_name(column)).collect()
+}
+
+/// Returns the name of the time column of a file, without its stem.
+fn time(file: &InspectedFile) -> Option<String> {
+    let column = file.meanings.iter().position(|meaning| *meaning == Meaning::Time)?;
+    Some(file.columns[column].name.clone())
+}
+
+/// The first file of a recipe and those joined to it, each with the prefix of its columns.
+fn paths_and_stems(recipe: &Recipe) -> impl Iterator<Item = (&Path, Option<String>)> {
+    let joined = recipe.join.iter().zip(recipe.stems());
+    let joined = joined.map(|(joined, stem)| (joined.file.as_path(), Some(stem)));
+    once((recipe.data.as_path(), None)).chain(joined)
+}
+
+/// Returns the name of a file without its folder.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}

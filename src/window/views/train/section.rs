@@ -1,0 +1,140 @@
+//! The section through the surfaces along a wire.
+
+use decoupler_files::figure::{
+    PlotFigure,
+    surface::{Section, SectionLine, section_figure},
+};
+use eframe::egui::{Button, Color32, TextStyle, Ui, Vec2, WidgetInfo, accesskit::Role};
+use glam::DVec2;
+
+use crate::window::{
+    shared::Look,
+    test_view::{Drawing, TestView},
+    theme::space,
+    widgets::{dim_ui, explained_options_ui},
+};
+
+/// Direction of a section.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Along {
+    /// Along a row-wire, through its nodes.
+    #[default]
+    RowWires,
+    /// Along a column-wire, below the nodes.
+    ColumnWires,
+}
+
+/// The wire along which the surfaces are cut.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SectionChoice {
+    /// Kind of wire.
+    pub along: Along,
+    /// Places of the row-wire among those read, and of the column-wire; the middle ones until the user chooses.
+    wires: Option<[usize; 2]>,
+}
+
+/// Numbers of row-wires read and of column-wires.
+fn counts(test: &TestView) -> [usize; 2] {
+    [test.rows.len(), test.sensor.scale.columns()]
+}
+
+impl SectionChoice {
+    /// Places of the row-wire and the column-wire, within the sensor.
+    fn wires(&self, test: &TestView) -> [usize; 2] {
+        let counts = counts(test);
+        let wires = self.wires.unwrap_or(counts.map(|count| count / 2));
+        [0, 1].map(|axis| wires[axis].min(counts[axis].saturating_sub(1)))
+    }
+
+    /// Returns the section through the sensor of `test`.
+    pub fn section(&self, test: &TestView) -> Section {
+        let ([place, column], geometry) = (self.wires(test), &test.sensor.geometry);
+        let row = test.rows.get(place).copied().unwrap_or(0);
+        let (line, at_mm) = match self.along {
+            Along::RowWires => (SectionLine::RowWire(row), geometry.row_x_mm(row)),
+            Along::ColumnWires => (SectionLine::ColumnWire(column), geometry.column_node_mm(column, 0).y),
+        };
+        Section { line, at_mm }
+    }
+
+    /// Returns the choice of the wire before this one (`by` −1) or after it (+1), if there is one.
+    pub fn stepped(&self, by: isize, test: &TestView) -> Option<Self> {
+        let (axis, mut wires) = (self.along as usize, self.wires(test));
+        let place = wires[axis].checked_add_signed(by);
+        wires[axis] = place.filter(|place| *place < counts(test)[axis])?;
+        let wires = Some(wires);
+        Some(Self { wires, ..*self })
+    }
+
+    /// Cuts along these wires: the row-wire by its place among those read, and the column-wire.
+    pub fn choose(&mut self, wires: [usize; 2]) {
+        self.wires = Some(wires);
+    }
+
+    /// Cuts along the wires nearest to a place.
+    pub fn choose_at(&mut self, place_mm: DVec2, test: &TestView) {
+        fn nearest(places_mm: impl Iterator<Item = f64>, at_mm: f64) -> usize {
+            let distances = places_mm.map(|place_mm| (place_mm - at_mm).abs()).enumerate();
+            let nearest = distances.min_by(|one, other| one.1.total_cmp(&other.1));
+            nearest.map_or(0, |(place, _)| place)
+        }
+        let geometry = &test.sensor.geometry;
+        let rows = test.rows.iter().map(|&row| geometry.row_x_mm(row));
+        let columns = (0..test.sensor.scale.columns()).map(|column| geometry.column_node_mm(column, 0).y);
+        self.choose([nearest(rows, place_mm.x), nearest(columns, place_mm.y)]);
+    }
+}
+
+/// Returns the figure of the section through the displayed surfaces.
+pub fn section_of(choice: &SectionChoice, test: &TestView, drawing: &Drawing, look: Look) -> PlotFigure {
+    let dressed = |surface| look.dressed(surface, String::new());
+    let decoded = drawing.decoded.as_ref().map(|[decoded, _]| dressed(decoded));
+    let (section, actual) = (choice.section(test), dressed(&drawing.actual));
+    section_figure(&section, &test.rows, &actual, decoded.as_ref())
+}
+
+const DIRECTIONS: [(Along, &str, &str); 2] = [
+    (
+        Along::RowWires,
+        "Row-wire",
+        "Cuts the surfaces along a row-wire, through its nodes.",
+    ),
+    (
+        Along::ColumnWires,
+        "Column-wire",
+        "Cuts the surfaces above a column-wire, across all row-wires.",
+    ),
+];
+
+/// The choice of the section.
+pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, test: &TestView) {
+    ui.horizontal(|ui| {
+        let picked = explained_options_ui(ui, "Section along", &DIRECTIONS, choice.along, false);
+        choice.along = picked.unwrap_or(choice.along);
+        ui.add_space(space(1));
+        step_ui(ui, choice, -1, test);
+        let axis = choice.along as usize;
+        ui.label(format!("{} of {}", choice.wires(test)[axis] + 1, counts(test)[axis]));
+        step_ui(ui, choice, 1, test);
+        let hint = "or click a surface or a reading";
+        let font = TextStyle::Body.resolve(ui.style());
+        let galley = ui.painter().layout_no_wrap(hint.to_owned(), font, Color32::WHITE);
+        if galley.size().x < ui.available_width() {
+            dim_ui(ui, hint);
+        }
+    });
+}
+
+/// An arrow to the wire before (`by` −1) or after (+1).
+fn step_ui(ui: &mut Ui, choice: &mut SectionChoice, by: isize, test: &TestView) {
+    let (text, name, hint) = match by {
+        ..0 => ("‹", "Previous section", "Cuts along the previous wire ([)."),
+        _ => ("›", "Next section", "Cuts along the next wire (])."),
+    };
+    let stepped = choice.stepped(by, test);
+    let arrow = ui.add_enabled(stepped.is_some(), Button::new(text).min_size(Vec2::splat(space(6))));
+    arrow.widget_info(|| WidgetInfo::labeled(Role::Button, stepped.is_some(), name));
+    if arrow.on_hover_text(hint).clicked() {
+        *choice = stepped.unwrap_or(*choice);
+    }
+}

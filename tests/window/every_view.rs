@@ -1,0 +1,186 @@
+//! The suite over views: every view with both sources at common sizes and zooms. Each control has a name, each picture a
+//! description, no text is cut off at its side. `PICTURES=FOLDER cargo test --test window every_view` also writes a
+//! picture of each view at each size in both themes.
+
+use std::{collections::BTreeSet, env, fs, path::PathBuf};
+
+use decoupler::window::SourceKind;
+use eframe::egui::{
+    Rect, Shape, Vec2,
+    accesskit::Role,
+    epaint::{ClippedShape, TextShape},
+    vec2,
+};
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+
+use crate::{
+    driver::Driver,
+    sources::{BOTH, trained_small},
+};
+
+/// The views, as named in the top bar.
+pub(crate) const VIEWS: [&str; 5] = ["Train", "Study", "Compare", "Sensor", "Live"];
+
+/// Sizes of the window in pixels.
+const SIZES: [Vec2; 4] = [
+    vec2(1440.0, 900.0),
+    vec2(1366.0, 768.0),
+    vec2(1024.0, 700.0),
+    vec2(960.0, 640.0),
+];
+
+/// Zooms of the window in percent: of everything at once, so that there are fewer points.
+const ZOOMS_PERCENT: [f32; 3] = [100.0, 120.0, 140.0];
+
+/// Texts that are cut off today, one in a line: "view, source: text".
+const KNOWN_CUTS: &str = include_str!("known_cuts.txt");
+
+/// Roles of controls.
+const CONTROLS: [Role; 10] = [
+    Role::Button,
+    Role::CheckBox,
+    Role::RadioButton,
+    Role::ComboBox,
+    Role::Slider,
+    Role::SpinButton,
+    Role::Tab,
+    Role::TextInput,
+    Role::MultilineTextInput,
+    Role::SearchInput,
+];
+
+/// Shows a view and waits for what it computes without being asked.
+pub(crate) fn show(driver: &mut Driver, view: &str) {
+    driver.click_button(view);
+    if view == "Sensor" && driver.has("Array scale") {
+        driver.wait("the analysis", |driver| driver.says("Condition number: "));
+    }
+    driver.settle();
+}
+
+#[test]
+fn every_view_is_named_described_and_whole() {
+    let mut faults = BTreeSet::new();
+    for source in BOTH {
+        let mut opened = trained_small(source);
+        let driver = &mut opened.driver;
+        for view in VIEWS {
+            show(driver, view);
+            let place = format!("{view}, {}", name_of(source));
+            for tab in tabs(driver) {
+                driver.click(&tab);
+                driver.settle();
+                faults.extend(
+                    unnamed(driver)
+                        .into_iter()
+                        .map(|fault| format!("{place}, {tab}: {fault}")),
+                );
+            }
+            faults.extend(unnamed(driver).into_iter().map(|fault| format!("{place}: {fault}")));
+            for size in SIZES {
+                for zoom_percent in ZOOMS_PERCENT {
+                    driver.harness().set_size(size * 100.0 / zoom_percent);
+                    driver.settle();
+                    let cuts = cut_texts(driver)
+                        .into_iter()
+                        .map(|text| without_digits(&format!("{place}: {text}")));
+                    faults.extend(cuts.filter(|cut| !KNOWN_CUTS.lines().any(|known| known == cut)));
+                    if zoom_percent == 100.0 {
+                        take_pictures(driver, &format!("{view}-{}-{}x{}", name_of(source), size.x, size.y));
+                    }
+                }
+            }
+            driver.harness().set_size(SIZES[0]);
+            driver.settle();
+        }
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
+fn name_of(source: SourceKind) -> &'static str {
+    match source {
+        SourceKind::Array => "array",
+        SourceKind::Recording => "recording",
+    }
+}
+
+/// Returns the names of the tabs of the view.
+fn tabs(driver: &mut Driver) -> Vec<String> {
+    let tabs = driver.harness().query_all(By::new().role(Role::Tab));
+    tabs.filter_map(|tab| tab.accesskit_node().label()).collect()
+}
+
+/// Returns the controls without a name or a value, and the pictures without a description.
+fn unnamed(driver: &mut Driver) -> Vec<String> {
+    let mut faults = Vec::new();
+    for node in driver.harness().root().children_recursive() {
+        let node = node.accesskit_node();
+        let (role, name) = (node.role(), node.label().unwrap_or_default());
+        if CONTROLS.contains(&role) && name.trim().is_empty() {
+            faults.push(format!("a {role:?} at {:?} has no name", node.bounding_box()));
+        }
+        if matches!(role, Role::Slider | Role::SpinButton) && node.numeric_value().is_none() && node.value().is_none() {
+            faults.push(format!("{name} has no value"));
+        }
+        if role == Role::Image {
+            let sentence = node.description().or(node.value()).unwrap_or_default();
+            if sentence.split_whitespace().count() <= 2 && name.split_whitespace().count() <= 6 {
+                faults.push(format!("“{name}” is described only by “{sentence}”"));
+            }
+        }
+    }
+    faults
+}
+
+/// Returns the visible texts that reach past the side of what they are drawn in, or past the window.
+fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
+    let screen = driver.harness().ctx.content_rect();
+    let mut cuts = BTreeSet::new();
+    for ClippedShape { clip_rect, shape, .. } in &driver.harness().output().shapes {
+        each_text(shape, &mut |text| {
+            let place = Rect::from_min_size(text.pos, text.galley.size());
+            let parent = clip_rect.intersect(screen);
+            let is_visible = parent.intersects(place) && !text.galley.text().trim().is_empty();
+            // Rounding to pixels is no cut; what a scroll bar hides above and below comes into sight.
+            let is_cut = place.left() < parent.left() - 1.5 || place.right() > parent.right() + 1.5;
+            if is_visible && is_cut && text.angle == 0.0 {
+                cuts.insert(text.galley.text().to_owned());
+            }
+        });
+    }
+    cuts
+}
+
+fn each_text(shape: &Shape, take: &mut impl FnMut(&TextShape)) {
+    match shape {
+        Shape::Text(text) => take(text),
+        Shape::Vec(shapes) => shapes.iter().for_each(|shape| each_text(shape, take)),
+        _ => {}
+    }
+}
+
+/// Replaces each number by one sign: numbers differ from machine to machine.
+fn without_digits(text: &str) -> String {
+    let mut out = String::new();
+    for letter in text.replace('\n', " ").chars() {
+        let letter = if letter.is_ascii_digit() { '#' } else { letter };
+        if letter != '#' || !out.ends_with('#') {
+            out.push(letter);
+        }
+    }
+    out
+}
+
+/// Writes the window as it is, in both themes, where the environment names a folder for pictures.
+fn take_pictures(driver: &mut Driver, name: &str) {
+    let Some(folder) = env::var_os("PICTURES").map(PathBuf::from) else {
+        return;
+    };
+    fs::create_dir_all(&folder).unwrap();
+    for theme in ["Light theme", "Dark theme"] {
+        driver.act(theme);
+        let picture = driver.harness().render().unwrap();
+        let theme = theme.split(' ').next().unwrap().to_lowercase();
+        picture.save(folder.join(format!("{name}-{theme}.png"))).unwrap();
+    }
+}
