@@ -137,7 +137,7 @@ terms! { NETWORK_TERMS:
     STARTS = "Restarts",
         "Number of trainings from different random weights, side by side. Several starts show how much the results vary.";
     AUTO = "Automatic settings",
-        "Memory, scaling, hidden nodes, method and epochs are chosen by cross-validation on the training samples, in about a \
+        "History of readings, scaling, hidden nodes, method and epochs are chosen by cross-validation on the training samples, in about a \
          minute; the answer is the best combination of ridge, kernel ridge and networks. Turned off, the form begins with the settings that were chosen.";
     COMBINE = "Combine restarts",
         "Keep the start with the lowest validation error, or average the answers of all starts: their mean is one network \

@@ -55,6 +55,7 @@ pub(crate) fn show(driver: &mut Driver, view: &str) {
     if view == "Sensor" && driver.has("Array scale") {
         driver.wait("the analysis", |driver| driver.says("Condition number: "));
     }
+    driver.wait("the surfaces", |driver| !driver.says("are being prepared"));
     driver.settle();
 }
 

@@ -17,6 +17,7 @@ use crate::{
     driver::Driver,
     experiments::wait_for_the_end,
     sources::{Opened, open_small},
+    training::endless,
 };
 
 const TOPIC: &str = "Speed against accuracy";
@@ -265,7 +266,7 @@ fn a_measurement_shows_its_points_as_they_arrive_and_can_be_cancelled() {
 #[test]
 fn a_measurement_waits_while_a_training_would_distort_its_times() {
     let mut opened = open_small(SourceKind::Array);
-    opened.change(|settings| settings.training.stopping.epochs = 1_000_000);
+    opened.change(|settings| settings.training = endless().training);
     let mut driver = opened.driver;
     driver.click_button("Study");
     driver.click(TOPIC);

@@ -2,6 +2,7 @@
 //! that a view may ask for.
 
 mod command;
+mod effect;
 mod error_table;
 mod export;
 mod look;
@@ -9,11 +10,11 @@ mod offers;
 mod run_list;
 mod run_view;
 mod state;
-mod training_form;
 mod view;
 
 pub use super::training_worker::{RunResult, RunView};
 pub use command::{About, Command, Offer, Offers};
+pub use effect::{Effect, Matter, Notice};
 pub use error_table::error_table_ui;
 pub use export::{
     ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, ToCopy, file_stem,
@@ -24,5 +25,4 @@ pub use offers::{FileInUse, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
 pub use run_view::{run_buttons_ui, sentence, training_status};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
-pub use training_form::{Effect, Matter, Notice};
 pub use view::{Columns, Holdings, MIN_WIDTH_FOR_REPORT, Status, Tone, Unfinished, View, ViewKind};
