@@ -55,7 +55,11 @@ pub(crate) fn show(driver: &mut Driver, view: &str) {
     if view == "Sensor" && driver.has("Array scale") {
         driver.wait("the analysis", |driver| driver.says("Condition number: "));
     }
-    driver.wait("the surfaces", |driver| !driver.says("are being prepared"));
+    if view == "Compare" {
+        driver.wait("the run", |driver| {
+            driver.says("Dashed: training") && !driver.says("being prepared")
+        });
+    }
     driver.settle();
 }
 
