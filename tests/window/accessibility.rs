@@ -4,23 +4,10 @@ use decoupler::window::Phase;
 use eframe::egui::{Event, Key, Modifiers, Rect, Shape, accesskit::Role};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
-use crate::driver::Driver;
-
-const VIEWS: [&str; 5] = ["Train", "Study", "Compare", "Sensor", "Live"];
-
-/// Roles of controls.
-const CONTROLS: [Role; 10] = [
-    Role::Button,
-    Role::CheckBox,
-    Role::RadioButton,
-    Role::ComboBox,
-    Role::Slider,
-    Role::SpinButton,
-    Role::Tab,
-    Role::TextInput,
-    Role::MultilineTextInput,
-    Role::SearchInput,
-];
+use crate::{
+    driver::Driver,
+    every_view::{CONTROLS, VIEWS},
+};
 
 /// Opens a view and waits for its initial contents.
 fn show(driver: &mut Driver, view: &str) {

@@ -36,7 +36,7 @@ const ZOOMS_PERCENT: [f32; 3] = [100.0, 120.0, 140.0];
 const KNOWN_CUTS: &str = include_str!("known_cuts.txt");
 
 /// Roles of controls.
-const CONTROLS: [Role; 10] = [
+pub(crate) const CONTROLS: [Role; 10] = [
     Role::Button,
     Role::CheckBox,
     Role::RadioButton,

@@ -156,7 +156,7 @@ pub(super) type Drafts = (SourceKind, RunSettings, RecordingDraft);
 /// Undo and redo history of the settings. A drag counts as one change, and so do changes less than a second apart.
 pub(super) type DraftsUndoer = Undoer<Drafts>;
 
-/// Returns the present settings; their plan is shared, not copied.
+/// Returns the current settings; their plan is shared, not copied.
 pub(super) fn drafts(shared: &Shared) -> Drafts {
     (shared.source, shared.draft, shared.recording.clone())
 }

@@ -133,7 +133,7 @@ pub struct Offer {
     pub is_possible: bool,
 }
 
-/// The commands of this frame. Whoever offers a command carries it out when [`Self::offer`] returns true: its keys were
+/// The commands of this frame. The caller that offers a command carries it out when [`Self::offer`] returns true: its keys were
 /// pressed, or it was picked.
 #[derive(Debug)]
 pub struct Offers<'a> {

@@ -259,6 +259,19 @@ impl Shared {
             && (self.source == SourceKind::Array || self.recording.is_plan(run.plan.as_ref()))
     }
 
+    /// Returns true if the settings or the plan have changed since `run` began or was continued. Plans are compared only if
+    /// they are not the same one.
+    pub fn has_changed_since(&self, run: &RunView) -> bool {
+        let asked = run.asked.settings();
+        match self.source {
+            SourceKind::Array => self.draft != *asked,
+            SourceKind::Recording => {
+                let RecordingDraft { settings, plan, .. } = &self.recording;
+                plan.is_ok() && (settings != asked || !self.recording.is_plan(run.plan.as_ref()))
+            }
+        }
+    }
+
     /// The current result.
     pub fn result(&self) -> Option<&RunResult> {
         self.shown_run().and_then(|run| run.result.as_ref())

@@ -102,7 +102,7 @@ pub struct Columns {
     pub has_report: bool,
 }
 
-/// What a view is doing, as the line at the bottom tells it.
+/// Status of a view, shown in the line at the bottom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Status {
     /// Colour of the dot before the text.

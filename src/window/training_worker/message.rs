@@ -240,7 +240,7 @@ pub struct Worker {
     watched: Arc<Watched>,
 }
 
-/// What the window tells the worker in the middle of its work.
+/// Message of the window to the worker during its work.
 #[derive(Debug, Default)]
 pub(super) struct Watched {
     /// Number of the training last asked for: the preparations of others are cancelled.

@@ -175,7 +175,7 @@ pub struct Answered {
     pub history: History,
     /// How far the answer can be trusted.
     pub confidence: Vec<Fact>,
-    /// The present fault of the wires, and its consequence.
+    /// The current fault of the wires, and its consequence.
     pub fault: Option<(String, String)>,
 }
 
@@ -408,7 +408,7 @@ fn outside(session: &Session, of: usize, target: &str) -> Fact {
     Fact::new("Outside training", hint, value, warns)
 }
 
-/// Returns the present fault of the wires, and its consequence if there is one.
+/// Returns the current fault of the wires, and its consequence if there is one.
 fn fault(watched: &Watched) -> (Fact, Option<String>) {
     let (value, consequence) = match watched {
         Watched::NoNoise | Watched::TooLarge => ("not looked for".to_owned(), None),

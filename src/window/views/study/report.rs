@@ -93,7 +93,7 @@ impl Tone {
     }
 }
 
-/// A line beside the figure.
+/// A line next to the figure.
 #[derive(Clone, Debug)]
 pub enum Note {
     /// Heading of the following lines.

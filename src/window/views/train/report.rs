@@ -233,7 +233,7 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, (run, result): (&RunView, &RunResult
     if plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random) {
         note_ui(ui, bias(SplitBy::Random));
     }
-    if shared.setup().is_ok_and(|setup| setup != run.asked) {
+    if shared.has_changed_since(run) {
         dim_ui(ui, "The settings have changed since this training.");
     }
 }
