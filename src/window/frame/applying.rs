@@ -22,8 +22,8 @@ impl DecouplerWindow {
     pub fn apply(&mut self, effect: Effect) {
         let shared = &mut self.shared;
         match effect {
-            Effect::Configure(draft) => self.configure(*draft),
-            Effect::ConfigureRecording(settings) => {
+            Effect::Configure(draft) if draft.simulation().is_some() => self.configure(*draft),
+            Effect::Configure(settings) => {
                 // Settings that the user gives are not chosen, except for those that a choice keeps.
                 let RunSettings { source, seed, .. } = *settings;
                 let kept = RunSettings {

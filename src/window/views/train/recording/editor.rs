@@ -24,7 +24,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::RunSummary,
-    import::{Meaning, Plan, Setup, Watch},
+    import::{FileSet, Plan, Setup, Watch},
 };
 
 /// Editor of the recording that is trained on: its files, the meaning of their columns, and the division of the samples.
@@ -49,8 +49,6 @@ pub struct RecordingEditor {
     is_refused: bool,
     /// The run that the window knew last.
     run: Option<RunId>,
-    /// Share held out for validation that the method needs; `None` if the share of a plan is to be kept.
-    held_out: Option<f64>,
 }
 
 /// Use of a file that the user is asked for.
@@ -62,8 +60,6 @@ pub(super) enum Use {
     Missing(PathBuf),
     /// A recording of test samples.
     Test,
-    /// Positions of the targets.
-    Positions,
 }
 
 impl RecordingEditor {
@@ -79,7 +75,6 @@ impl RecordingEditor {
             asked: None,
             is_refused: false,
             run: None,
-            held_out: None,
         }
     }
 
@@ -116,7 +111,6 @@ impl RecordingEditor {
 
     /// Opens the files of `plan`, whose paths are absolute, unless they are open.
     pub fn open_plan(&mut self, plan: &Plan) {
-        self.held_out = None;
         let is_open = self.plan().is_ok_and(|open| *open == *plan);
         let missing = self.missing.as_ref().map(|missing| &missing.recorded.plan);
         if !is_open && missing != Some(plan) {
@@ -138,25 +132,35 @@ impl RecordingEditor {
         self.import.is_none() && self.missing.is_none() && !self.reading.is_opening()
     }
 
-    /// Closes a recording; without the last one there is no import.
-    pub(super) fn close(&mut self, number: usize) {
+    /// Closes a file; without the last recording there is no import.
+    pub(super) fn close(&mut self, path: &Path) {
         let Some(import) = &mut self.import else { return };
-        if number == 0 && !import.plan.import.append.is_empty() {
+        let plan = import.edit();
+        let recipe = &mut plan.import;
+        let is_of_test = plan.test.iter().flat_map(FileSet::files).any(|file| file == path);
+        let appended = recipe.append.iter().position(|set| set.data == path);
+        if is_of_test {
+            plan.test = None;
+        } else if recipe.positions.as_deref() == Some(path) {
+            recipe.positions = None;
+        } else if let Some(number) = appended {
+            recipe.append.remove(number);
+            import.write_meanings(true);
+        } else if recipe.data == path && !recipe.append.is_empty() {
             // The next one takes its place, with the files joined to it.
-            let recipe = &mut import.edit().import;
             let next = recipe.append.remove(0);
             recipe.data = next.data;
             for (joined, file) in recipe.join.iter_mut().zip(next.join) {
                 joined.file = file;
             }
-            return self.read_again();
-        }
-        let mut paths = import.paths();
-        paths.remove(number);
-        if paths.is_empty() {
-            self.close_all();
+            self.read_again();
         } else {
-            self.open_files(Vec::new(), paths);
+            let mut paths = import.paths();
+            paths.retain(|other| other != path);
+            match paths.is_empty() {
+                true => self.close_all(),
+                false => self.open_files(Vec::new(), paths),
+            }
         }
     }
 
@@ -205,6 +209,7 @@ impl RecordingEditor {
     /// Takes events of the threads and paths chosen, and reports the plan if it has changed.
     pub fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.take_chosen(shared.phase.is_busy(), effects);
+        let is_by_user = !self.reading.is_reopening();
         if let Some(opened) = self.reading.next_opened() {
             let is_refused = std::mem::take(&mut self.is_refused);
             match opened {
@@ -213,7 +218,7 @@ impl RecordingEditor {
                 Ok(opened) if is_refused && !matches!(opened, Opened::Missing(_)) => {}
                 Ok(opened) => {
                     effects.push(Effect::Settle(Matter::Recording));
-                    self.take(opened, shared, effects);
+                    self.take(opened, is_by_user, shared, effects);
                 }
                 Err(reason) => effects.push(failed(reason)),
             }
@@ -223,7 +228,6 @@ impl RecordingEditor {
             (self.run, self.shows_columns) = (run, false);
         }
         let settings = &shared.recording.settings;
-        self.follow_method(settings);
         let plan = self.plan();
         // Training needs the processor.
         if !shared.phase.is_busy() {
@@ -244,26 +248,23 @@ impl RecordingEditor {
 
     fn take_chosen(&mut self, is_busy: bool, effects: &mut Vec<Effect>) {
         let Some((of, receiver)) = &self.asked else { return };
-        let paths = Vec::from_iter(receiver.try_iter().map(|path| absolute(&path)));
-        let (Some(path), false) = (paths.first().cloned(), is_busy) else {
+        let (Ok(path), false) = (receiver.try_recv(), is_busy) else {
             return;
         };
+        let path = absolute(&path);
         match (of.clone(), &mut self.import, &self.missing) {
-            (Use::Recording, ..) => self.open(paths),
+            (Use::Recording, ..) => self.open(vec![path]),
             (Use::Missing(missing), _, Some(reopened)) => {
                 let reopened = Reopened::clone(reopened);
                 self.take_found(reopened, missing, path);
             }
-            (Use::Test, Some(import), _) => {
-                let refused = paths.into_iter().filter_map(|path| import.add_test_file(path).err());
-                effects.extend(refused.map(failed));
-            }
-            (Use::Positions, Some(import), _) => import.edit().import.positions = Some(path),
+            (Use::Test, Some(import), _) => effects.extend(import.set_test_file(path).err().map(failed)),
             _ => {}
         }
     }
 
-    fn take(&mut self, opened: Opened, shared: &Shared, effects: &mut Vec<Effect>) {
+    /// Takes what was opened; shows the columns if the user has opened it.
+    fn take(&mut self, opened: Opened, is_by_user: bool, shared: &Shared, effects: &mut Vec<Effect>) {
         let usual = shared.recording.settings.validation_fraction();
         let holding_out = |mut import: Import| {
             import.edit().division.validation_fraction.get_or_insert(usual);
@@ -273,12 +274,13 @@ impl RecordingEditor {
             Opened::Recordings(import) => {
                 let import = import.keeping(self.import.take().unwrap_or_default());
                 (self.import, self.missing) = (holding_out(import), None);
+                self.changed.clear();
                 self.show_columns(effects);
             }
             Opened::Plan(import, reopened) => {
                 self.close_all();
                 (self.import, self.changed) = (holding_out(*import), reopened.changed);
-                if reopened.is_recipe {
+                if is_by_user {
                     self.show_columns(effects);
                 }
                 if let Some(checkpoint) = reopened.checkpoint {
@@ -288,9 +290,7 @@ impl RecordingEditor {
             }
             Opened::Missing(reopened) => {
                 self.close_all();
-                if let Some(checkpoint) = &reopened.checkpoint {
-                    take_settings(checkpoint.settings, effects);
-                }
+                effects.extend(reopened.checkpoint.iter().flat_map(|saved| configured(saved.settings)));
                 self.missing = Some(reopened);
             }
             Opened::Simulation(source) => {
@@ -298,8 +298,7 @@ impl RecordingEditor {
                     source: (*source).into(),
                     ..shared.draft
                 };
-                effects.push(Effect::ChooseSource(SourceKind::Array));
-                effects.push(Effect::Configure(Box::new(settings)));
+                effects.push(Effect::TakeSetup(Box::new(settings.into())));
             }
             Opened::Network(file, import) => {
                 let summary = RunSummary::of(&file);
@@ -307,10 +306,9 @@ impl RecordingEditor {
                 match import {
                     None => effects.push(Effect::TakeSetup(Box::new(file.setup()))),
                     Some(import) => {
-                        self.held_out = None;
-                        take_settings(file.settings, effects);
+                        effects.extend(configured(file.settings));
                         match import {
-                            Ok(opened) => self.take(*opened, shared, effects),
+                            Ok(opened) => self.take(*opened, is_by_user, shared, effects),
                             Err(reason) => effects.push(failed(reason)),
                         }
                     }
@@ -326,25 +324,25 @@ impl RecordingEditor {
 
     /// Shows the columns of files that the user has opened.
     fn show_columns(&mut self, effects: &mut Vec<Effect>) {
-        self.changed.clear();
         self.shows_columns = true;
         effects.push(Effect::ChooseSource(SourceKind::Recording));
     }
 
-    /// Sets the share held out for validation when another method needs another share, unless the user has set it.
-    fn follow_method(&mut self, settings: &RunSettings) {
-        let fraction = settings.validation_fraction();
-        let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.reading.is_reopening();
-        if let (true, Some(import)) = (is_new, &mut self.import) {
+    /// Sets the share held out for validation if the method of the new settings of a recording needs another one.
+    pub fn follow_method(&mut self, before: &RunSettings, settings: &RunSettings) {
+        let (fraction, is_recording) = (settings.validation_fraction(), settings.simulation().is_none());
+        if let (true, Some(import)) = (
+            is_recording && fraction != before.validation_fraction(),
+            &mut self.import,
+        ) {
             import.edit().division.validation_fraction = Some(fraction);
         }
-        self.held_out = Some(fraction);
     }
 
     /// Selects one network for all rows if no column contains the row numbers.
     fn follow_row_wires(&self, settings: &RunSettings, effects: &mut Vec<Effect>) {
         if settings.source.row_model() == RowModel::Each && !self.has_row_wires() && !self.reading.is_reopening() {
-            effects.push(Effect::ConfigureRecording(Box::new(RunSettings {
+            effects.push(Effect::Configure(Box::new(RunSettings {
                 source: Source::Measured { rows: RowModel::Shared },
                 ..*settings
             })));
@@ -375,8 +373,8 @@ impl RecordingEditor {
 
     /// Returns the numbers of inputs and targets, once there are both.
     pub fn channels(&self) -> Option<(usize, usize)> {
-        let import = self.import.as_ref()?;
-        let channels = (import.count(Meaning::Input), import.count(Meaning::Target));
+        let recipe = &self.import.as_ref()?.plan.import;
+        let channels = (recipe.inputs.len(), recipe.targets.len());
         Some(channels).filter(|channels| channels.0 > 0 && channels.1 > 0)
     }
 
@@ -409,9 +407,10 @@ fn failed(reason: String) -> Effect {
     Effect::Notify(Matter::Recording, Notice::Failed(reason))
 }
 
-fn take_settings(settings: RunSettings, effects: &mut Vec<Effect>) {
-    effects.push(Effect::ChooseSource(SourceKind::Recording));
-    effects.push(Effect::ConfigureRecording(Box::new(settings)));
+/// Effects that make these the settings of the next training on a recording.
+fn configured(settings: RunSettings) -> [Effect; 2] {
+    let configure = Effect::Configure(Box::new(settings));
+    [Effect::ChooseSource(SourceKind::Recording), configure]
 }
 
 fn absolute(path: &Path) -> PathBuf {
