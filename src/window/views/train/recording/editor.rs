@@ -41,14 +41,12 @@ pub struct RecordingEditor {
     pub(super) reading: Reading,
     /// Texts in the fields of options that are not in the plan, by the names of the options, with the reason if they were refused.
     pub(super) typed: BTreeMap<&'static str, (String, Option<String>)>,
-    /// True if the user is viewing the columns while there is a run to show.
-    pub(super) shows_columns: bool,
+    /// The run in whose place the user is viewing the columns.
+    pub(super) hidden: Option<RunId>,
     /// The file asked for last, and where its path arrives.
     asked: Option<(Use, Receiver<PathBuf>)>,
     /// True while the recordings of a checkpoint are looked for that the worker could not resume.
     is_refused: bool,
-    /// The run that the window knew last.
-    run: Option<RunId>,
 }
 
 /// Use of a file that the user is asked for.
@@ -71,10 +69,9 @@ impl RecordingEditor {
             changed: Vec::new(),
             reading: Reading::new(Arc::clone(wake)),
             typed: BTreeMap::new(),
-            shows_columns: false,
+            hidden: None,
             asked: None,
             is_refused: false,
-            run: None,
         }
     }
 
@@ -223,10 +220,6 @@ impl RecordingEditor {
                 Err(reason) => effects.push(failed(reason)),
             }
         }
-        let run = shared.run.as_ref().map(|run| run.id);
-        if run != self.run {
-            (self.run, self.shows_columns) = (run, false);
-        }
         let settings = &shared.recording.settings;
         let plan = self.plan();
         // Training needs the processor.
@@ -270,18 +263,21 @@ impl RecordingEditor {
             import.edit().division.validation_fraction.get_or_insert(usual);
             Some(import)
         };
+        let shown = shared.run.as_ref().map(|run| run.id);
         match opened {
             Opened::Recordings(import) => {
                 let import = import.keeping(self.import.take().unwrap_or_default());
                 (self.import, self.missing) = (holding_out(import), None);
                 self.changed.clear();
-                self.show_columns(effects);
+                effects.push(Effect::ChooseSource(SourceKind::Recording));
+                self.hidden = shown;
             }
             Opened::Plan(import, reopened) => {
                 self.close_all();
                 (self.import, self.changed) = (holding_out(*import), reopened.changed);
                 if is_by_user {
-                    self.show_columns(effects);
+                    effects.push(Effect::ChooseSource(SourceKind::Recording));
+                    self.hidden = shown;
                 }
                 if let Some(checkpoint) = reopened.checkpoint {
                     let setup = Setup::recording(checkpoint.settings, reopened.recorded.plan);
@@ -320,12 +316,6 @@ impl RecordingEditor {
             }
             Opened::Checkpoint(path) => effects.push(Effect::OpenTraining(path)),
         }
-    }
-
-    /// Shows the columns of files that the user has opened.
-    fn show_columns(&mut self, effects: &mut Vec<Effect>) {
-        self.shows_columns = true;
-        effects.push(Effect::ChooseSource(SourceKind::Recording));
     }
 
     /// Sets the share held out for validation if the method of the new settings of a recording needs another one.
@@ -393,7 +383,8 @@ impl RecordingEditor {
 
     /// Returns true if the columns take the place of the results in the middle of the view.
     pub fn is_on_show(&self, shared: &Shared) -> bool {
-        shared.source == SourceKind::Recording && (self.shows_columns || shared.shown_run().is_none())
+        let run = shared.shown_run().map(|run| run.id);
+        shared.source == SourceKind::Recording && (run.is_none() || run == self.hidden)
     }
 
     /// Returns the files of the import, which must not be overwritten.

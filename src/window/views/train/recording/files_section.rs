@@ -23,7 +23,8 @@ use crate::window::{
 pub(super) const FILES: FileWords = FileWords {
     kind: "recording",
     description: "A table of readings and targets (CSV or other text, Excel, .npy, .npz, .mat), a recipe, a network or a \
-                  checkpoint.",
+                  checkpoint. A table with the header target,x,y says where each target lies on the skin, in millimetres: \
+                  then surfaces are shown.",
     extensions: &[
         "csv",
         "txt",
@@ -141,7 +142,7 @@ impl RecordingEditor {
         let text = if is_on_show { "Show results" } else { "Columns…" };
         let hint = "Shows the columns of the files and their meanings in place of the results, or the results again.";
         if ui.add(ghost_button(text)).on_hover_text(hint).clicked() {
-            self.shows_columns = !is_on_show;
+            self.hidden = shared.run.as_ref().map(|run| run.id).filter(|_| !is_on_show);
             ui.request_repaint();
         }
     }

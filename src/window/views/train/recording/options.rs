@@ -18,7 +18,7 @@ use super::{
 };
 use crate::window::{
     glossary,
-    shared::{Effect, FileWords, Shared},
+    shared::{Effect, Shared},
     widgets::{
         dim_ui,
         fields::{input_text, list_ui, options_ui, percent_ui, seed_ui},
@@ -223,12 +223,6 @@ fn named<T: Named>(text: &str) -> Result<Option<T>, String> {
     given(text).map(T::parse).transpose().map_err(|error| error.to_string())
 }
 
-const TEST_FILES: FileWords = FileWords {
-    kind: "recording for the test",
-    description: "A recording with the same columns; all its samples are test samples.",
-    ..FILES
-};
-
 impl RecordingEditor {
     /// Shows the folded parts of the import; changes the seed of `settings`.
     pub fn folds_ui(&mut self, ui: &mut Ui, settings: &mut RunSettings, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -237,17 +231,11 @@ impl RecordingEditor {
         let is_joined = !plan.import.join.is_empty();
         fold_ui(ui, "Samples", &samples_summary(import, settings), |ui| {
             self.split_ui(ui, settings.validation_fraction());
-            if is_joined {
-                dim_ui(
-                    ui,
-                    "Files for the test have “test” in their names. Open all of them at once.",
-                );
-            } else if ui
-                .add(ghost_button("Test file…"))
-                .on_hover_text(TEST_FILES.description)
-                .clicked()
-            {
-                effects.push(Effect::ChooseFile(self.ask(Use::Test, TEST_FILES, String::new())));
+            let hint = "A recording with the same columns; all its samples are test samples. Files for the test that are \
+                        joined have “test” in their names: open all of them at once.";
+            let button = ui.add_enabled(!is_joined, ghost_button("Test file…"));
+            if button.on_hover_text(hint).on_disabled_hover_text(hint).clicked() {
+                effects.push(Effect::ChooseFile(self.ask(Use::Test, FILES, String::new())));
             }
             seed_ui(ui, "Seed", glossary::SEED.hint, &mut settings.seed.0, 0);
         });
@@ -268,15 +256,6 @@ impl RecordingEditor {
              within a group and across no gap in time. Chosen with the other settings unless it is given here.",
         ];
         self.part_ui(ui, "History of readings", usual, &notes, &HISTORY);
-        let positions = plan.import.positions.as_ref().map(|path| file_name(path));
-        fold_ui(ui, "Positions", positions.as_deref().unwrap_or("none"), |ui| {
-            dim_ui(
-                ui,
-                "Targets that are deformations or forces at places of the skin, such as taxels: with their positions the \
-                 actual and the decoded surface of each test sample are shown. Add a file with the header target,x,y: the \
-                 name of each target, and where it lies on the skin in millimetres.",
-            );
-        });
         let by_number =
             "Rows belong together by their number. To join by time, make a column of each file “time” in the table.";
         match plan.import.time {
