@@ -11,16 +11,16 @@ use eframe::egui::{Align, Color32, Layout, Rect, RichText, Ui, Vec2};
 use glam::DVec2;
 
 use super::{
-    charts::{SAMPLE, SECTION, has_target_surface, lit_nodes},
+    charts::{SAMPLE, SECTION, lit_nodes},
     press::{Hand, Shown},
     view::TrainView,
 };
 use crate::window::{
     shared::{Effect, Phase, RightCard, Shared, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
-    test_view::{Drawing, Positions},
+    test_view::Drawing,
     theme::{Theme, semibold, space, type_size},
-    widgets::{card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
+    widgets::{card_ui, dim_ui, explained_options_ui, placeholder_ui, segmented_ui},
 };
 
 /// Work of the pointer on the actual surface.
@@ -36,7 +36,7 @@ const HANDS: [(Hand, &str, &str); 2] = [
 
 /// Both surfaces side by side with their colour scale; all targets of the sample if a recording has no surfaces.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
-    if shared.source == SourceKind::Recording && !has_target_surface(shared) {
+    if shared.source == SourceKind::Recording && through(shared).is_none() {
         card_ui(ui, rect, |ui| sample_card_ui(ui, view, shared));
         return;
     }
@@ -84,17 +84,14 @@ pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
             None => Some(item),
         }),
         lit_nodes: lit_nodes(view, shared),
-        section: shared.test().filter(|_| is_cut).map(|test| view.section.section(test)),
+        section: shared.skin().filter(|_| is_cut).map(|skin| view.section.section(skin)),
     }
     .with_common_scales()
 }
 
 /// The surface through the targets of a recording.
-fn through(shared: &Shared) -> Option<&TargetSurface> {
-    match &shared.recorded_test()?.positions {
-        Positions::Surface(through) => Some(through),
-        _ => None,
-    }
+pub(super) fn through(shared: &Shared) -> Option<&TargetSurface> {
+    shared.test()?.through()
 }
 
 /// Returns the item at a node of a surface: the node itself, or the target there.
@@ -150,7 +147,7 @@ fn head_ui(ui: &mut Ui, place: Place, view: &mut TrainView, shared: &Shared, eff
 }
 
 /// The invitation on a card without a network: to press, which a small network answers, or to train.
-fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+fn invitation_ui(ui: &mut Ui, view: &TrainView, shared: &Shared) {
     let text = if view.press.is_pressing() {
         view.press.waiting_text(shared)
     } else if shared.phase.is_busy() {
@@ -160,15 +157,6 @@ fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
          its surface take shape here."
     };
     placeholder_ui(ui, text);
-    if let Some(test) = shared.test().filter(|_| !view.press.is_pressing()) {
-        ui.vertical_centered(|ui| {
-            ui.add_space(space(3));
-            let hint = "Presses a ball onto the middle of the surface.";
-            if ui.add(ghost_button("Press it")).on_hover_text(hint).clicked() {
-                view.press.press_middle(test);
-            }
-        });
-    }
 }
 
 fn surface_ui(
@@ -179,7 +167,7 @@ fn surface_ui(
     shared: &Shared,
     effects: &mut Vec<Effect>,
 ) {
-    let (array, look, theme) = (shared.test(), shared.look, Theme::of(ui));
+    let (array, look, theme) = (shared.skin(), shared.look, Theme::of(ui));
     let surface_view = SurfaceView {
         label: &format!("{} surface", surface.title),
         surface,
@@ -194,10 +182,10 @@ fn surface_ui(
         false => surface_view.show(ui, look.camera),
     };
     let response = &shown.response;
-    if let (Place::Actual, Some(test)) = (place, array) {
+    if let (Place::Actual, Some(skin)) = (place, array) {
         view.press.take_target(&shown, surface);
         let (painter, pointer) = (ui.painter(), response.hover_pos());
-        view.press.outline_ui(painter, &theme.palette, pointer, test.stroke_mm);
+        view.press.outline_ui(painter, &theme.palette, pointer, skin.stroke_mm);
     }
     let mut marked = figure.marked_node;
     follow_surface(&shown, look, &mut marked, effects);
@@ -206,11 +194,11 @@ fn surface_ui(
     }
     // A pressed surface is cut too.
     let is_chosen = response.clicked() || (is_touched && response.is_pointer_button_down_on());
-    if let (true, Some(test)) = (is_chosen && figure.section.is_some(), array)
+    if let (true, Some(skin)) = (is_chosen && figure.section.is_some(), array)
         && let (Some(at), Some(sight)) = (response.interact_pointer_pos(), shown.sight)
         && let Some(place) = surface.pick(&sight.ray(DVec2::new(f64::from(at.x), f64::from(at.y))))
     {
-        view.section.choose_at(place.truncate(), test);
+        view.section.choose_at(place.truncate(), skin);
     }
     shown.node_tooltip_ui(|ui, node| {
         if let Some(drawing) = view.drawing() {
@@ -221,10 +209,10 @@ fn surface_ui(
 
 /// The node under the pointer and its values, in two lines that hide little.
 fn node_values_ui(ui: &mut Ui, drawing: &Drawing, shared: &Shared, node: usize) {
-    let target = || shared.recorded_test()?.problem.targets.get(item_at(shared, node)?);
-    let (title, [name, found], unit) = if let Some(test) = shared.test() {
-        let per_row = test.sensor.scale.nodes_per_row();
-        let row = test.rows.get(node / per_row).map_or(0, |row| row + 1);
+    let target = || shared.test()?.problem.targets.get(item_at(shared, node)?);
+    let (title, [name, found], unit) = if let Some(skin) = shared.skin() {
+        let per_row = skin.sensor.scale.nodes_per_row();
+        let row = skin.rows.get(node / per_row).map_or(0, |row| row + 1);
         let title = format!("Row {row}, node {}", node % per_row + 1);
         (title, ["z", "decoded"], " mm".to_owned())
     } else if let Some(target) = target() {
@@ -264,7 +252,7 @@ fn sample_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
         let title = format!("Test sample {}", view.snapshot + 1);
         ui.label(RichText::new(title).font(semibold(type_size().title)));
     });
-    if let Some(Positions::NoSurface(reason)) = shared.recorded_test().map(|test| &test.positions) {
+    if let Some(Err(reason)) = shared.test().and_then(|test| test.through.as_ref()) {
         let text = format!("No surface goes through the positions of the targets: {reason}.");
         dim_ui(ui, &text);
     }
