@@ -219,9 +219,6 @@ impl DecouplerWindow {
                 let _ = chosen.send(path);
                 self.ctx.request_repaint();
             }
-            // A training may have begun while the desktop's dialog was open.
-            Purpose::Open if self.shared.phase.is_busy() => {}
-            Purpose::Open => self.begin(Origin::File(path)),
         }
     }
 

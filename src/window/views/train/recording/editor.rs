@@ -15,7 +15,7 @@ use super::{
 };
 use crate::window::{
     job::Wake,
-    shared::{Effect, FileInUse, FileTask, FileWords, Matter, Notice, Purpose, RecordingDraft, Shared, SourceKind},
+    shared::{Effect, FileInUse, FileTask, Matter, Notice, RecordingDraft, Shared, SourceKind},
     training_worker::RunId,
 };
 use decoupler_core::{
@@ -45,8 +45,6 @@ pub struct RecordingEditor {
     pub(super) hidden: Option<RunId>,
     /// The file asked for last, and where its path arrives.
     asked: Option<(Use, Receiver<PathBuf>)>,
-    /// True while the recordings of a checkpoint are looked for that the worker could not resume.
-    is_refused: bool,
 }
 
 /// Use of a file that the user is asked for.
@@ -71,29 +69,23 @@ impl RecordingEditor {
             typed: BTreeMap::new(),
             hidden: None,
             asked: None,
-            is_refused: false,
         }
     }
 
     /// Returns the task of opening a file.
     pub fn open_task(&mut self) -> FileTask {
-        self.ask(Use::Recording, FILES, String::new())
+        self.ask(Use::Recording, String::new())
     }
 
     /// Returns the task of asking for the path of a file.
-    pub(super) fn ask(&mut self, of: Use, words: FileWords, suggestion: String) -> FileTask {
+    pub(super) fn ask(&mut self, of: Use, suggestion: String) -> FileTask {
         let (sender, receiver) = channel();
         self.asked = Some((of, receiver));
-        FileTask {
-            words,
-            suggestion,
-            purpose: Purpose::Choose(sender),
-        }
+        FileTask::choose(FILES, suggestion, sender)
     }
 
     /// Opens files: recordings are added to those that are open; a recipe, a network or a checkpoint takes their place.
     pub fn open(&mut self, paths: Vec<PathBuf>) {
-        self.is_refused = false;
         let paths = Vec::from_iter(paths.iter().map(|path| absolute(path)));
         if let (Some(reopened), [path]) = (&self.missing, &paths[..]) {
             let mut missing = reopened.missing.iter();
@@ -116,12 +108,6 @@ impl RecordingEditor {
         } else if self.reading.is_reopening() {
             self.reading.cancel();
         }
-    }
-
-    /// Checks the recordings of the checkpoint at `path`, which could not be resumed: they may be missing.
-    pub fn look_for_recordings(&mut self, path: PathBuf) {
-        self.open(vec![path]);
-        self.is_refused = true;
     }
 
     /// Returns true if no file is open, missing or being opened.
@@ -207,18 +193,13 @@ impl RecordingEditor {
     pub fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.take_chosen(shared.phase.is_busy(), effects);
         let is_by_user = !self.reading.is_reopening();
-        if let Some(opened) = self.reading.next_opened() {
-            let is_refused = std::mem::take(&mut self.is_refused);
-            match opened {
-                // The window has said why it was refused.
-                Err(_) if is_refused => {}
-                Ok(opened) if is_refused && !matches!(opened, Opened::Missing(_)) => {}
-                Ok(opened) => {
-                    effects.push(Effect::Settle(Matter::Recording));
-                    self.take(opened, is_by_user, shared, effects);
-                }
-                Err(reason) => effects.push(failed(reason)),
+        match self.reading.next_opened() {
+            Some(Ok(opened)) => {
+                effects.push(Effect::Settle(Matter::Recording));
+                self.take(opened, is_by_user, shared, effects);
             }
+            Some(Err(reason)) => effects.push(failed(reason)),
+            None => {}
         }
         let settings = &shared.recording.settings;
         let plan = self.plan();
@@ -347,18 +328,11 @@ impl RecordingEditor {
                 "{name} is missing: find it under “Files”, or open another recording."
             ));
         }
-        match (&self.import, self.obstacle()) {
-            (None, _) => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
-            (Some(_), _) if self.reading.is_opening() => Err("Files are being opened.".to_owned()),
-            (Some(_), Some(obstacle)) => Err(obstacle),
-            (Some(import), None) => Ok(Arc::clone(&import.plan)),
+        match &self.import {
+            None => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
+            Some(_) if self.reading.is_opening() => Err("Files are being opened.".to_owned()),
+            Some(import) => import.obstacle().map_or_else(|| Ok(Arc::clone(&import.plan)), Err),
         }
-    }
-
-    /// Returns the reason why there is nothing to train on yet: a text that was refused, or what the plan lacks.
-    pub(super) fn obstacle(&self) -> Option<String> {
-        let refused = self.typed.values().find_map(|(_, refusal)| refusal.clone());
-        refused.or_else(|| self.import.as_ref()?.obstacle())
     }
 
     /// Returns the numbers of inputs and targets, once there are both.

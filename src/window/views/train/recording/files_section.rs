@@ -83,7 +83,7 @@ impl RecordingEditor {
             find.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Find {name}")));
             let find = find.on_hover_text("Choose the file in its new place. Its contents are checked.");
             if find.clicked() {
-                effects.push(Effect::ChooseFile(self.ask(Use::Missing(path), FILES, name)));
+                effects.push(Effect::ChooseFile(self.ask(Use::Missing(path), name)));
             }
         }
         if is_training {
@@ -93,12 +93,10 @@ impl RecordingEditor {
 
     /// Shows the numbers of channels and samples, or the error of the import.
     fn samples_line_ui(&self, ui: &mut Ui) {
-        if self.import.is_none() {
-            return;
-        }
+        let Some(import) = &self.import else { return };
         let (inputs, targets) = self.channels().unwrap_or_default();
         let channels = format!("{}, {}", counted(inputs, "input"), counted(targets, "target"));
-        match (self.obstacle(), &self.reading.state) {
+        match (import.obstacle(), &self.reading.state) {
             (Some(reason), _) => drop(note_ui(ui, &sentence(&reason))),
             (None, State::Checked(Err(reason))) => drop(note_ui(ui, &sentence(reason))),
             (None, State::Checked(Ok(checked))) => {

@@ -96,7 +96,11 @@ pub(super) fn open_files(
     let mut plan = Plan::default();
     let mut in_order = paths.iter().cloned();
     plan.import.data = in_order.next().unwrap_or_default();
-    plan.import.join = in_order.map(joined).collect();
+    let joined = in_order.map(|file| Joined {
+        file,
+        ..Joined::default()
+    });
+    plan.import.join = joined.collect();
     let inspected = inspect(&plan)?;
     plan = if has_new {
         suggested_plan(&inspected)
@@ -109,13 +113,6 @@ pub(super) fn open_files(
     plan.import.positions = positions.into_iter().next();
     let inspected = inspect(&plan)?;
     Ok(Opened::Recordings(Box::new(Import::suggested(plan, inspected))))
-}
-
-fn joined(file: PathBuf) -> Joined {
-    Joined {
-        file,
-        ..Joined::default()
-    }
 }
 
 fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Opened, String> {

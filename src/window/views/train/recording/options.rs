@@ -9,11 +9,10 @@ use decoupler_core::{
     text::Named,
 };
 use decoupler_files::import::{Condition, Decimal, Encoding, Plan, Separator};
-use eframe::egui::{Id, Response, TextEdit, Ui};
+use eframe::egui::{Id, TextEdit, Ui};
 
 use super::{
     editor::{RecordingEditor, Use},
-    files_section::FILES,
     import::{Import, file_name},
 };
 use crate::window::{
@@ -235,7 +234,7 @@ impl RecordingEditor {
                         joined have “test” in their names: open all of them at once.";
             let button = ui.add_enabled(!is_joined, ghost_button("Test file…"));
             if button.on_hover_text(hint).on_disabled_hover_text(hint).clicked() {
-                effects.push(Effect::ChooseFile(self.ask(Use::Test, FILES, String::new())));
+                effects.push(Effect::ChooseFile(self.ask(Use::Test, String::new())));
             }
             seed_ui(ui, "Seed", glossary::SEED.hint, &mut settings.seed.0, 0);
         });
@@ -256,12 +255,8 @@ impl RecordingEditor {
              within a group and across no gap in time. Chosen with the other settings unless it is given here.",
         ];
         self.part_ui(ui, "History of readings", usual, &notes, &HISTORY);
-        let by_number =
-            "Rows belong together by their number. To join by time, make a column of each file “time” in the table.";
-        match plan.import.time {
-            _ if !is_joined => {}
-            Some(_) => self.part_ui(ui, "Joined files", "by time", &[], &JOINS),
-            None => self.part_ui(ui, "Joined files", "row by row", &[by_number], &[]),
+        if is_joined && plan.import.time.is_some() {
+            self.part_ui(ui, "Joined files", "by time", &[], &JOINS);
         }
         if !formats.is_empty() {
             let notes = Vec::from_iter(formats.iter().map(String::as_str));
@@ -326,9 +321,8 @@ impl RecordingEditor {
         if edit.changed() {
             self.typed.insert(name, (text.clone(), None));
         }
-        match refusal {
-            Some(reason) if !edit.has_focus() => drop(note_ui(ui, &reason)),
-            _ => {}
+        if let Some(reason) = refusal.filter(|_| !edit.has_focus()) {
+            note_ui(ui, &reason);
         }
         (is_untried && !edit.has_focus()).then_some(text)
     }
@@ -365,9 +359,7 @@ impl RecordingEditor {
         } else {
             let hint = "Share of the samples held out for testing.";
             percent_ui(ui, "Test share", hint, &mut division.test_fraction, 0.2, 1.0..=90.0);
-            let is_random = division.by == SplitBy::Random;
-            let bias_ui: fn(&mut Ui, &str) -> Response = if is_random { note_ui } else { dim_ui };
-            bias_ui(ui, bias(division.by));
+            dim_ui(ui, bias(division.by));
         }
         let hint = "Share of the other samples that selects the best weights and ends the training. Bayesian \
                     regularisation needs none.";
