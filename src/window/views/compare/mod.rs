@@ -19,7 +19,7 @@ use self::{
 };
 use crate::window::{
     job::Wake,
-    plotting::{Pointer, plots_ui, titled_plots_ui},
+    plotting::{plots_ui, titled_plots_ui},
     shared::{
         Effect, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, Status, View, colour_scale_ui,
         follow_surface, target_choice_ui, view_mode_ui,
@@ -215,7 +215,7 @@ impl CompareView {
                 let targets = compared.test.recording().map_or(&[][..], |test| &test.problem.targets);
                 target_choice_ui(ui, "Target", &format!("target of {letter}"), targets, &mut side.target);
                 if let Some(chart) = &chart {
-                    plots_ui(ui, &format!("Regression of {letter}"), chart, Pointer::Moves);
+                    plots_ui(ui, &format!("Regression of {letter}"), chart);
                 }
             }
             (Some(Err(reason)), None) => {
