@@ -8,7 +8,8 @@ use crate::window::{
     job::caught,
     preview,
     shared::{
-        Effect, FileInUse, FileTask, Look, Matter, Phase, Purpose, RecordingDraft, RunsRequest, SourceKind, ViewKind,
+        Effect, FileInUse, FileTask, Look, Matter, OpenPlan, Phase, Purpose, RecordingDraft, RunsRequest, SourceKind,
+        ViewKind,
     },
     theme,
     training_worker::{LOST, Origin, Request, TrainedRun},
@@ -36,7 +37,7 @@ impl DecouplerWindow {
                 self.notices.settle(Matter::Settings);
             }
             Effect::ChooseAutomatically(is_auto) => self.choose_automatically(is_auto),
-            Effect::Import(plan) => shared.recording.plan = plan,
+            Effect::Import(plan) => shared.recording.plan = plan.map(OpenPlan),
             Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
             Effect::ChooseSource(_) => {}
             Effect::TakeSetup(setup) => self.take_setup(&setup),
@@ -63,7 +64,7 @@ impl DecouplerWindow {
                 // The settings on the left are always those of the running training.
                 if let Some(run) = &mut shared.run {
                     run.is_saved = false;
-                    let training = run.asked.settings().training;
+                    let training = run.asked.settings.training;
                     shared.set_training(training);
                 }
                 shared.phase = Phase::Training;
@@ -91,10 +92,7 @@ impl DecouplerWindow {
             }
             Effect::Export(exporting) => self.modal = Some(Modal::Export(*exporting)),
             Effect::Copy(to_copy, notice) => self.copy(to_copy, notice),
-            Effect::KeepRun(file) => self.runs.ask(RunsRequest::Keep(file)),
-            Effect::RenameRun(id, name) => self.runs.ask(RunsRequest::Rename(id, name)),
-            Effect::PinRun(place, id) => self.runs.ask(RunsRequest::Pin(place, id)),
-            Effect::RemoveRun(id) => self.runs.ask(RunsRequest::Remove(id)),
+            Effect::ChangeRuns(request) => self.runs.ask(request),
             Effect::Notify(matter, notice) => self.notices.add(matter, notice),
             Effect::Settle(matter) => self.notices.settle(matter),
         }
@@ -128,11 +126,10 @@ impl DecouplerWindow {
         if let (false, Some(setup)) = (is_auto, chosen) {
             self.take_setup(&setup);
             // Given by hand, these settings would have had the same result.
-            if let Some(run) = &mut self.shared.run {
-                run.plan = setup.plan().map(|plan| Arc::new(plan.clone()));
-                run.asked = setup;
+            let asked = self.shared.asked();
+            if let (Some(run), Ok(asked)) = (&mut self.shared.run, asked) {
+                run.asked = asked;
             }
-            self.share_plan();
         }
     }
 
@@ -260,7 +257,7 @@ impl DecouplerWindow {
                 self.shared.recording = RecordingDraft {
                     settings: *setup.settings(),
                     is_auto: false,
-                    plan: Ok(Arc::new(plan)),
+                    plan: Ok(OpenPlan(Arc::new(plan))),
                 };
             }
         }

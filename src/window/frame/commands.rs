@@ -139,7 +139,7 @@ impl DecouplerWindow {
             return;
         };
         match &recording.plan {
-            Ok(plan) if !self.shared.recording.is_plan(Some(plan)) => self.views.open_plan(plan),
+            Ok(plan) if self.shared.recording.plan.as_ref() != Ok(plan) => self.views.open_plan(plan),
             Ok(_) => {}
             // Undoing closes no files.
             Err(_) => recording.plan.clone_from(&self.shared.recording.plan),

@@ -1,26 +1,14 @@
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 use decoupler_core::{evaluation::TestErrors, text::capitalised, training::StopReason};
-use decoupler_files::{
-    export::{format_duration, format_number, format_percent},
-    import::Progress as Reading,
-};
+use decoupler_files::export::{format_duration, format_number, format_percent};
 use eframe::egui::{Key, Ui, WidgetInfo, accesskit::Role};
 
-use super::{Effect, Phase, RecordingDraft, RunView, Shared, SourceKind, Status, Tone};
+use super::{Effect, Phase, RunView, Shared, SourceKind, Status, Tone};
 use crate::window::{
     theme::space,
     widgets::{ghost_button, primary_button, with_shortcut},
 };
-
-impl RunView {
-    /// Shares the plan of `draft`, if that is the same.
-    pub fn share_plan(&mut self, draft: &RecordingDraft) {
-        if let (Ok(plan), true) = (&draft.plan, draft.is_plan(self.plan.as_ref())) {
-            self.plan = Some(Arc::clone(plan));
-        }
-    }
-}
 
 /// The buttons that run a training, from right to left.
 pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -73,11 +61,8 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
 pub fn training_status(shared: &Shared) -> Status {
     let mut status = phase_in_words(shared);
     if let (Phase::Preparing, SourceKind::Recording) = (shared.phase, shared.source) {
-        if let Some(choosing) = &shared.choosing {
-            status.progress = Some(("Choosing settings", choosing.share as f32));
-        } else if let Some(Reading { bytes, of: Some(of) }) = shared.reading {
-            status.progress = Some(("Reading", bytes as f32 / of.max(1) as f32));
-        }
+        let preparing = shared.preparing.as_ref();
+        status.progress = preparing.and_then(|preparing| Some((preparing.work, preparing.share?)));
         return status;
     }
     let running = shared.run.as_ref().filter(|_| shared.phase.is_busy());
@@ -100,8 +85,8 @@ fn phase_in_words(shared: &Shared) -> Status {
         Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
         Phase::Idle => (Tone::Calm, "Ready: press Train"),
         Phase::Preparing if is_recording => {
-            let choosing = shared.choosing.as_ref().map(|choosing| choosing.text.as_str());
-            (Tone::Busy, choosing.unwrap_or("Reading the recording"))
+            let preparing = shared.preparing.as_ref().map(|preparing| preparing.text.as_str());
+            (Tone::Busy, preparing.unwrap_or("Reading the recording"))
         }
         Phase::Preparing => (Tone::Busy, "Drawing samples"),
         Phase::Training => (Tone::Busy, "Training"),

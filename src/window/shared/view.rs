@@ -6,7 +6,7 @@ use eframe::egui::{Key, RichText, Ui};
 
 use super::{Effect, FileInUse, Offers, Shared, Shown};
 use crate::window::{
-    theme::{Theme, space, type_size},
+    theme::{Theme, type_size},
     widgets::{state_ui, status_progress_ui},
 };
 
@@ -36,7 +36,7 @@ pub trait View: Debug {
     /// Shows its column on the left.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
-    /// Shows its column on the right, where [`ViewKind::columns`] has one.
+    /// Shows its column on the right, where [`ViewKind::has_report`] has one.
     fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Shows its middle. Returns the status line at the bottom, or `None` for that of the training.
@@ -80,27 +80,14 @@ impl ViewKind {
         KEYS[self as usize]
     }
 
-    /// Returns its columns in a window of this width in points.
-    pub fn columns(self, window_width: f32) -> Columns {
-        let is_narrow = window_width < MIN_WIDTH_FOR_REPORT;
-        Columns {
-            form_width: space(if self == Self::Train && is_narrow { 62 } else { 68 }),
-            has_report: self == Self::Train && !is_narrow,
-        }
+    /// Returns true if it has a column on the right in a window of this width in points.
+    pub fn has_report(self, window_width: f32) -> bool {
+        self == Self::Train && window_width >= MIN_WIDTH_FOR_REPORT
     }
 }
 
 /// Width of a window, in points, from which a column on the right leaves the middle enough room.
 pub const MIN_WIDTH_FOR_REPORT: f32 = 1400.0;
-
-/// The columns next to the middle of a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Columns {
-    /// Width of the one on the left, in points.
-    pub form_width: f32,
-    /// True if there is a column on the right.
-    pub has_report: bool,
-}
 
 /// Status of a view, shown in the line at the bottom.
 #[derive(Clone, Debug, PartialEq)]

@@ -21,7 +21,7 @@ use crate::window::{
     job::Wake,
     plotting::{Pointer, plots_ui, titled_plots_ui},
     shared::{
-        Effect, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, Status, View, colour_scale_ui,
+        Effect, NetworkSource, PLACES, RightCard, RunList, RunsRequest, Shared, Shown, Status, View, colour_scale_ui,
         follow_surface, target_choice_ui, view_mode_ui,
     },
     surface_view::{ColourBar, SurfaceView},
@@ -135,7 +135,11 @@ impl CompareView {
             let others = ids.filter(|id| !pinned.contains(&Some(*id)));
             let mut newest = Vec::from_iter(others.take(empty.clone().count()));
             newest.reverse();
-            effects.extend(empty.zip(newest).map(|(place, id)| Effect::PinRun(place, Some(id))));
+            effects.extend(
+                empty
+                    .zip(newest)
+                    .map(|(place, id)| Effect::ChangeRuns(RunsRequest::Pin(place, Some(id)))),
+            );
         }
         self.seen = count;
     }

@@ -1,7 +1,6 @@
 use std::sync::Arc;
 
 use decoupler_core::{text::counted, training::StopReason};
-use decoupler_files::import::Setup;
 use eframe::egui::{Sense, Ui};
 use ndarray::Array2;
 
@@ -290,7 +289,7 @@ impl TrainView {
         }
         let is_complete = |run: &RunView| {
             let was_stopped = run.stop_reason == Some(StopReason::Stopped);
-            run.asked == Setup::from(settings) && run.stop_reason.is_some() && !was_stopped
+            run.asked.settings == settings && run.stop_reason.is_some() && !was_stopped
         };
         if !shared.run.as_ref().is_some_and(is_complete) {
             effects.push(Effect::Train);
