@@ -3,13 +3,15 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
+use eframe::egui::ColorImage;
+
 use super::{DecouplerWindow, files::ToWrite, modal::Modal, remembered::is_within_limits, save_form::Saving};
 use crate::window::{
-    job::caught,
+    job::{JobError, caught},
     preview,
     shared::{
-        Effect, FileInUse, FileTask, Look, Matter, OpenPlan, Phase, Purpose, RecordingDraft, RunsRequest, SourceKind,
-        ViewKind,
+        Effect, FileInUse, FileTask, Look, Matter, Notice, OpenPlan, Phase, Purpose, RecordingDraft, RunsRequest,
+        SourceKind, ToCopy, ViewKind,
     },
     theme,
     training_worker::{LOST, Origin, Request, TrainedRun},
@@ -91,7 +93,18 @@ impl DecouplerWindow {
                 }
             }
             Effect::Export(exporting) => self.modal = Some(Modal::Export(*exporting)),
-            Effect::Copy(to_copy, notice) => self.copy(to_copy, notice),
+            Effect::Copy(ToCopy::Text(text), notice) => {
+                self.ctx.copy_text(text);
+                self.notices.add(Matter::Clipboard, Notice::Done(notice));
+            }
+            Effect::Copy(ToCopy::Picture(figure), notice) => {
+                let draw = move |_: &_| match figure.draw().pixels() {
+                    Ok((size, rgba)) => Ok((ColorImage::from_rgba_unmultiplied(size, &rgba), notice)),
+                    Err(error) => Err(error.to_string()),
+                };
+                let last = |drawn: Result<_, JobError>| drawn.map_err(|error| error.to_string()).flatten();
+                self.pictures.start(draw, last);
+            }
             Effect::ChangeRuns(request) => self.runs.ask(request),
             Effect::Notify(matter, notice) => self.notices.add(matter, notice),
             Effect::Settle(matter) => self.notices.settle(matter),
@@ -140,17 +153,16 @@ impl DecouplerWindow {
         self.runs.ask(RunsRequest::Look);
     }
 
-    /// Sets the look of all surfaces, and remembers the colours that the user chose.
+    /// Sets the look of all surfaces, and remembers the theme and the colours that the user chose.
     pub(super) fn look(&mut self, look: Look) {
-        if look.colours != self.shared.look.colours {
+        let before = std::mem::replace(&mut self.shared.look, look);
+        if look.colours != before.colours {
             self.chosen.colours = Some(look.colours);
         }
-        self.shared.look = look;
-    }
-
-    pub(super) fn set_dark(&mut self, is_dark: bool) {
-        self.shared.look.is_dark = is_dark;
-        theme::apply(&self.ctx, is_dark);
+        if look.is_dark != before.is_dark {
+            self.chosen.is_dark = Some(look.is_dark);
+            theme::apply(&self.ctx, look.is_dark);
+        }
     }
 
     /// Asks for a path in the window itself.

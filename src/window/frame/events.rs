@@ -14,7 +14,17 @@ use crate::window::{
 impl DecouplerWindow {
     /// Handles the events of threads and dialogs.
     pub fn take_events(&mut self) {
-        self.take_copied();
+        match self.pictures.next_event() {
+            Some(Ok((picture, notice))) => {
+                self.ctx.copy_image(picture);
+                self.notices.add(Matter::Clipboard, Notice::Done(notice));
+            }
+            Some(Err(reason)) => {
+                let text = format!("Nothing was copied: {reason}");
+                self.notices.fail(Matter::Clipboard, text);
+            }
+            None => {}
+        }
         while let Some(event) = self.worker.next_event() {
             self.take_event(event);
         }

@@ -73,10 +73,7 @@ pub(super) fn top_bar_ui(
 fn command_button_ui(ui: &mut Ui, offers: &[Offer], command: Command, text: &str) -> Option<Command> {
     let is_possible = offers.iter().any(|offer| offer.command == command && offer.is_possible);
     let about = command.about();
-    let hint = match about.keys {
-        Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
-        None => format!("{}.", about.name),
-    };
+    let hint = about.tooltip(ui.ctx());
     let button = ui.add_enabled(is_possible, ghost_button(text));
     button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &about.name));
     let button = button.on_hover_text(&hint).on_disabled_hover_text(&hint);

@@ -1,10 +1,9 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use decoupler_files::export::exit_leaving_nothing;
-use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder};
+use eframe::egui::{self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder};
 
 use super::{
-    clipboard::Copying,
     commands::{DraftsUndoer, SCALES, drafts},
     export_dialog::{card_menu_ui, export_menu_ui},
     files::{Dialogs, Files},
@@ -25,6 +24,9 @@ use crate::{
     },
 };
 
+/// A picture to be copied, and the message for the user.
+pub(super) type Drawn = Result<(ColorImage, String), String>;
+
 /// The window: the shared state, the views, and the one place where their effects are applied.
 pub struct DecouplerWindow {
     pub(super) shared: Shared,
@@ -40,7 +42,8 @@ pub struct DecouplerWindow {
     pub(super) previews: Background<PreviewEvent>,
     pub(super) runs: RunsWorker,
     pub(super) files: Files,
-    pub(super) copying: Copying,
+    /// Pictures that are drawn to be copied; the newest wins.
+    pub(super) pictures: Background<Drawn>,
     pub(super) dialogs: Dialogs,
     /// Command picked from the list or by a button, which is carried out in the next frame.
     pub(super) picked: Option<Command>,
@@ -102,7 +105,7 @@ impl DecouplerWindow {
             previews: Background::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
-            copying: Copying::new(desktop, Arc::clone(&wake)),
+            pictures: Background::prompt("picture", Arc::clone(&wake)),
             dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
             picked: None,
             undoer: DraftsUndoer::default(),
@@ -289,11 +292,11 @@ impl eframe::App for DecouplerWindow {
     }
 }
 
-/// Services of the desktop that the window uses: file dialogs and the clipboard.
+/// The file dialogs that the window uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Desktop {
     /// The desktop's own.
     Native,
-    /// None: the window asks for paths itself, and copies stay within the toolkit. For tests.
+    /// None: the window asks for paths itself. For tests.
     None,
 }

@@ -2,12 +2,12 @@ use std::time::Duration;
 
 use decoupler_core::{evaluation::TestErrors, text::capitalised, training::StopReason};
 use decoupler_files::export::{format_duration, format_number, format_percent};
-use eframe::egui::{Key, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Ui, WidgetInfo, accesskit::Role};
 
-use super::{Effect, Phase, RunView, Shared, SourceKind, Status, Tone};
+use super::{Command, Effect, Phase, RunView, Shared, SourceKind, Status, Tone};
 use crate::window::{
     theme::space,
-    widgets::{ghost_button, primary_button, with_shortcut},
+    widgets::{ghost_button, primary_button},
 };
 
 /// The buttons that run a training, from right to left.
@@ -15,7 +15,7 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     let phase = shared.phase;
     // In a narrow window the buttons show only their symbols.
     let is_short = ui.available_width() < space(120);
-    let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, hint: String, effect: Effect| {
+    let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, command: Command, effect: Effect| {
         let shown = if is_short {
             text.split(' ').next().unwrap_or(text)
         } else {
@@ -23,36 +23,25 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         };
         let button = ui.add_enabled(is_possible, ghost_button(shown));
         button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, text));
-        if button.on_hover_text(hint).clicked() {
+        if button.on_hover_text(command.about().tooltip(ui.ctx())).clicked() {
             effects.push(effect);
         }
     };
-    let hint = with_shortcut(ui, "Ends the training; the best network so far is kept", Key::Period);
-    button_ui(ui, "■ Stop", phase.is_busy(), hint, Effect::Stop);
-    let (text, effect) = match phase {
-        Phase::Paused => ("▶ Resume", Effect::Resume),
-        _ => ("⏸ Pause", Effect::Pause),
+    button_ui(ui, "■ Stop", phase.is_busy(), Command::StopTraining, Effect::Stop);
+    let (text, command, effect) = match phase {
+        Phase::Paused => ("▶ Resume", Command::ResumeTraining, Effect::Resume),
+        _ => ("⏸ Pause", Command::PauseTraining, Effect::Pause),
     };
-    let hint = with_shortcut(ui, "Pauses or resumes the training", Key::P);
     let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-    button_ui(ui, text, can_pause, hint, effect);
-    let can_train_longer = shared.can_continue();
-    let hint = match (can_train_longer, shared.source) {
-        (false, SourceKind::Array) => "Draws the sets and trains the network",
-        (true, SourceKind::Array) => "Starts again: draws the sets and trains the network",
-        (false, SourceKind::Recording) => "Reads the recording and trains the network",
-        (true, SourceKind::Recording) => "Starts again: reads the recording and trains the network",
-    };
+    button_ui(ui, text, can_pause, command, effect);
     let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
-    if train.on_hover_text(with_shortcut(ui, hint, Key::Enter)).clicked() {
+    let hint = Command::Train.about().tooltip(ui.ctx());
+    if train.on_hover_text(hint).clicked() {
         effects.push(Effect::Train);
     }
-    if can_train_longer {
-        let hint = "Continues from the current weights with the method and the epochs on the left, counted from here. \
-                    Train starts again from random weights.";
-        if ui.add(ghost_button("Train longer")).on_hover_text(hint).clicked() {
-            effects.push(Effect::Continue);
-        }
+    let longer = Command::TrainLonger.about();
+    if shared.can_continue() && ui.add(ghost_button(&longer.name)).on_hover_text(longer.hint).clicked() {
+        effects.push(Effect::Continue);
     }
 }
 

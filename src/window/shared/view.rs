@@ -2,12 +2,12 @@
 
 use std::fmt::Debug;
 
-use eframe::egui::{Key, RichText, Ui};
+use eframe::egui::{Align, Key, Layout, RichText, Sense, Ui, Vec2};
 
 use super::{Effect, FileInUse, Offers, Shared, Shown};
 use crate::window::{
-    theme::{Theme, type_size},
-    widgets::{state_ui, status_progress_ui},
+    theme::{Theme, space, type_size},
+    widgets::progress_bar_ui,
 };
 
 /// One of the views. It owns its private state and the handles of its threads, reads the shared state, and requests
@@ -131,12 +131,18 @@ impl Status {
             Tone::Bad => palette.bad,
         };
         ui.horizontal_centered(|ui| {
-            state_ui(ui, colour, &self.text);
+            ui.spacing_mut().item_spacing.x = space(4);
+            let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
+            ui.painter().circle_filled(dot.center(), 4.0, colour);
+            ui.label(RichText::new(&self.text).size(type_size().note));
             for note in &self.notes {
                 ui.label(RichText::new(note).size(type_size().note).color(palette.dim));
             }
             if let Some((name, share)) = self.progress {
-                status_progress_ui(ui, name, share);
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    ui.set_max_width(space(40).min(ui.available_width()));
+                    progress_bar_ui(ui, name, share, &format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0)));
+                });
             }
         });
     }
