@@ -115,8 +115,9 @@ fn a_window_that_remembers_becomes_idle() {
 
 /// Returns the edges of the columns on the left and on the right.
 fn edges(driver: &Driver) -> [Pos2; 2] {
-    let edges = driver.get_all("Resize panel");
-    let mut edges = Vec::from_iter(edges.iter().map(|edge| edge.rect().center()));
+    let places = driver.places().into_iter();
+    let edges = places.filter(|(label, _)| label == "Resize panel");
+    let mut edges = Vec::from_iter(edges.map(|(_, edge)| edge.center()));
     edges.sort_by(|one, other| one.x.total_cmp(&other.x));
     edges.try_into().unwrap()
 }
