@@ -30,7 +30,7 @@ fn theme_view_and_settings_are_restored_and_nothing_is_trained() {
     assert!(is_a_print(&driver.state().draft), "the first start");
     assert!(driver.state().look.is_dark && driver.shown() == "Train");
     driver.configure_small();
-    driver.click("Light theme");
+    driver.act("Light theme");
     driver.click_button("Compare");
     assert_eq!(driver.shown(), "Compare");
     drop(driver);
@@ -99,7 +99,7 @@ fn an_unwritable_location_is_reported_once() {
     let mut driver = Driver::open_remembering(&path);
     driver.wait("the reason", |driver| driver.says("will not be restored"));
     driver.click("Dismiss");
-    driver.click("Light theme");
+    driver.act("Light theme");
     driver.settle();
     assert_eq!(driver.notice(), None);
 }

@@ -348,13 +348,11 @@ impl DecouplerWindow {
             .ctx()
             .layer_painter(LayerId::new(Order::Foreground, Id::unique("dropping")));
         let whole = ui.ctx().content_rect().shrink(space(2));
-        painter.rect_filled(whole, f32::from(radius()), palette.background.gamma_multiply(0.85));
-        painter.rect_stroke(
-            whole,
-            f32::from(radius()),
+        let (fill, stroke) = (
+            palette.background.gamma_multiply(0.85),
             Stroke::new(2.0, palette.accent),
-            StrokeKind::Inside,
         );
+        painter.rect(whole, radius(), fill, stroke, StrokeKind::Inside);
         let font = FontId::proportional(type_size().title);
         let text = if self.shared.phase.is_busy() {
             BUSY

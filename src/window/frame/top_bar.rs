@@ -1,8 +1,8 @@
-use eframe::egui::{Align, Label, Layout, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Label, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
 use crate::window::{
     shared::{Command, Offer, ViewKind},
-    theme::{Theme, semibold, space, type_size},
+    theme::{semibold, space, type_size},
     widgets::{ghost_button, segmented_ui},
 };
 
@@ -11,9 +11,6 @@ const WIDE: f32 = 1280.0;
 
 /// Width below which the names of the views are closer together.
 const TIGHT: f32 = 1100.0;
-
-/// Width below which the mark is left out.
-const NARROW: f32 = 1000.0;
 
 /// Name, views, and the tools of the displayed view, which `tools_ui` lays out from right to left, before the tools of the
 /// window itself. Returns the command that the user clicked.
@@ -26,12 +23,9 @@ pub(super) fn top_bar_ui(
     ui.horizontal_centered(|ui| {
         ui.add_space(space(1));
         let width = ui.available_width();
-        // In a narrow window, tools that are also in the list of actions are left out first.
-        let (is_wide, is_narrow) = (width >= WIDE, width < NARROW);
-        if !is_narrow {
-            mark_ui(ui);
-        }
-        // The title of the window repeats the name.
+        // In a narrow window, tools that are also in the list of actions are left out first. The title of the window repeats
+        // the name.
+        let is_wide = width >= WIDE;
         if is_wide {
             ui.add(Label::new(RichText::new("Decoupler").font(semibold(type_size().title))).selectable(false));
         }
@@ -50,11 +44,6 @@ pub(super) fn top_bar_ui(
                 reached = reached.take().or(command_button_ui(ui, offers, command, text));
             };
             button_ui(ui, Command::Keys, "?");
-            if is_wide && Theme::of(ui).is_dark {
-                button_ui(ui, Command::Light, "Light");
-            } else if is_wide {
-                button_ui(ui, Command::Dark, "Dark");
-            }
             button_ui(ui, Command::Search, if is_wide { "Search" } else { "…" });
             if is_wide {
                 button_ui(ui, Command::Redo, "↻");
@@ -78,19 +67,4 @@ fn command_button_ui(ui: &mut Ui, offers: &[Offer], command: Command, text: &str
     button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &about.name));
     let button = button.on_hover_text(&hint).on_disabled_hover_text(&hint);
     button.clicked().then_some(command)
-}
-
-fn mark_ui(ui: &mut Ui) {
-    let theme = Theme::of(ui);
-    let (rect, _) = ui.allocate_exact_size(Vec2::splat(space(5)), Sense::hover());
-    // Three wires crossed by three, with one node pressed: the sensor in miniature.
-    let painter = ui.painter();
-    let stroke = Stroke::new(1.2, theme.palette.dim);
-    let inner = rect.shrink(space(1) - 1.0);
-    for step in 0..3 {
-        let share = 0.5 * step as f32;
-        painter.hline(inner.x_range(), inner.top() + share * inner.height(), stroke);
-        painter.vline(inner.left() + share * inner.width(), inner.y_range(), stroke);
-    }
-    painter.circle_filled(inner.center(), 3.5, theme.palette.accent);
 }

@@ -143,12 +143,7 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
                         .frame_when_inactive(true)
                         .corner_radius(radius() - 1)
                         .min_size(vec2(min_width, space(6)));
-                    let mut response = ui.add(button);
-                    if !meaning.is_empty() {
-                        response = response.on_hover_text(meaning);
-                    }
-                    let clicked = response.clicked();
-                    if clicked && !is_selected {
+                    if hinted(ui.add(button), meaning).clicked() && !is_selected {
                         picked = Some(option);
                     }
                 }
@@ -157,6 +152,14 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
         .response;
     name_group(ui, response.id, label);
     picked
+}
+
+/// Adds a tooltip; nothing if it is empty.
+pub fn hinted(response: Response, hint: &str) -> Response {
+    match hint {
+        "" => response,
+        _ => response.on_hover_text(hint),
+    }
 }
 
 /// Shows tabs, with the selected one underlined. Returns the tab that the user has just selected.

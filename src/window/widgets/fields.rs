@@ -11,7 +11,7 @@ use eframe::egui::{
 };
 
 use super::{
-    components::{refusal_ui, take_refusal},
+    components::{hinted, refusal_ui, take_refusal},
     explained_options_ui,
     quantity_text::parse,
 };
@@ -21,9 +21,9 @@ use crate::window::theme::{Theme, space};
 /// refused input is shown below.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
     let field = ui.horizontal(|ui| {
-        let label = ui.label(name).on_hover_text(hint);
+        let label = hinted(ui.label(name), hint);
         let value = ui.with_layout(Layout::right_to_left(Align::Center), value_ui).inner;
-        value.labelled_by(label.id).on_hover_text(hint)
+        hinted(value.labelled_by(label.id), hint)
     });
     refusal_ui(ui, &field.inner);
     field.inner
@@ -119,7 +119,7 @@ pub fn list_ui<T: Copy + PartialEq>(
             .width(space(31));
         let combo = combo.show_ui(ui, |ui| {
             for &(option, text, meaning) in options {
-                let choice = ui.selectable_label(option == selected, text).on_hover_text(meaning);
+                let choice = hinted(ui.selectable_label(option == selected, text), meaning);
                 if choice.clicked() && option != selected {
                     picked = Some(option);
                 }

@@ -6,7 +6,7 @@ mod quantity_text;
 mod table;
 
 pub use components::{
-    card_ui, coloured_fact_ui, dim_ui, explained_options_ui, fact_ui, focus_ring_ui, fold_ui, ghost_button,
+    card_ui, coloured_fact_ui, dim_ui, explained_options_ui, fact_ui, focus_ring_ui, fold_ui, ghost_button, hinted,
     invitation_ui, note_ui, placeholder_ui, primary_button, progress_bar_ui, refusal_ui, scrolled_ui,
     section_heading_ui, segmented_ui, snapshot_ui, tabs_ui,
 };
