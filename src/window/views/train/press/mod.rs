@@ -24,7 +24,7 @@ use crate::window::{
     job::{Background, JobError, Wake},
     shared::{RunResult, Shared},
     surface_view::SurfaceViewResponse,
-    test_view::TestView,
+    test_view::Skin,
 };
 
 pub use section::{press_section_ui, readings_head_ui, readings_ui};
@@ -84,9 +84,9 @@ impl PressState {
     }
 
     /// Presses the middle of the nodes.
-    pub fn press_middle(&mut self, test: &TestView) {
-        let (geometry, scale) = (&test.sensor.geometry, test.sensor.scale);
-        let [first, last] = [test.rows.first(), test.rows.last()].map(|row| row.copied().unwrap_or(0));
+    pub fn press_middle(&mut self, skin: &Skin) {
+        let (geometry, scale) = (&skin.sensor.geometry, skin.sensor.scale);
+        let [first, last] = [skin.rows.first(), skin.rows.last()].map(|row| row.copied().unwrap_or(0));
         let first = geometry.row_node_mm(scale, first, 0);
         let last = geometry.row_node_mm(scale, last, scale.nodes_per_row() - 1);
         self.place_mm = Some(0.5 * (first + last).truncate());
@@ -104,7 +104,7 @@ impl PressState {
 
     /// Has the touch answered, one question at a time; `result` is that of the displayed network.
     pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
-        let Some(test) = shared.test() else {
+        let Some(skin) = shared.skin() else {
             // A recording has no sensor model to press.
             self.let_go();
             self.target = None;
@@ -113,7 +113,7 @@ impl PressState {
         if self
             .answered
             .as_ref()
-            .is_some_and(|(question, _)| !question.is_of(test))
+            .is_some_and(|(question, _)| !question.is_of(skin))
         {
             // Another array, or another scene.
             self.let_go();
@@ -126,12 +126,12 @@ impl PressState {
             is_idle: result.is_idle,
         });
         if own.is_none() {
-            self.demo.follow(test);
+            self.demo.follow(skin);
         }
         let question = Question {
             finger: self.finger,
             place_mm,
-            test: test.clone(),
+            skin: Arc::clone(skin),
             subject: own.or_else(|| self.demo.subject.clone()?.ok()),
         };
         while let Some(answered) = self.solving.next_event() {
