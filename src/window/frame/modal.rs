@@ -194,7 +194,7 @@ fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
         }
     }
     found.sort_by_key(|(rank, _)| *rank);
-    let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
+    let terms = glossary::groups().into_iter().flat_map(|(_, terms)| terms);
     let terms = terms.filter(|term| !words.is_empty() && has_words(term.name));
     let terms = terms.map(|term| Line {
         name: term.name.to_owned(),
