@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{ops::Deref, sync::Arc};
 
 use decoupler_core::{
     dataset::SplitBy,
@@ -10,12 +10,50 @@ use decoupler_files::{
     figure::EpochOutline,
     import::{Plan, Recorded, Setup},
 };
+use serde::{Deserialize, Serialize};
 
 use super::{
     message::{Progress, RunId, RunResult, append_epochs},
     past_networks::PastNetworks,
 };
-use crate::window::test_view::{TestSet, TestViewError};
+use crate::window::test_view::{TestView, TestViewError};
+
+/// Plan of a recording, which the settings, the training and the file of the window share: comparing it costs nothing.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct OpenPlan(pub Arc<Plan>);
+
+impl PartialEq for OpenPlan {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0) || self.0 == other.0
+    }
+}
+
+impl Deref for OpenPlan {
+    type Target = Arc<Plan>;
+
+    fn deref(&self) -> &Arc<Plan> {
+        &self.0
+    }
+}
+
+/// What a training is asked for: settings, and the plan of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asked {
+    /// Settings.
+    pub settings: RunSettings,
+    /// Plan; `None` for a simulated array.
+    pub plan: Option<OpenPlan>,
+}
+
+impl Asked {
+    /// What this setup asks for.
+    pub fn of(setup: &Setup) -> Self {
+        Self {
+            settings: *setup.settings(),
+            plan: setup.plan().map(|plan| OpenPlan(Arc::new(plan.clone()))),
+        }
+    }
+}
 
 /// A training as known to the window.
 #[derive(Debug)]
@@ -24,17 +62,15 @@ pub struct RunView {
     pub id: RunId,
     /// Setup it is trained with.
     pub setup: Setup,
-    /// Setup on the left when it began or was continued: as [`Self::setup`], but with the number of epochs requested
+    /// What was on the left when it began or was continued: as [`Self::setup`], but with the number of epochs requested
     /// from that point.
-    pub asked: Setup,
-    /// Plan of [`Self::asked`] for a recording, shared with the settings on the left while they have the same.
-    pub plan: Option<Arc<Plan>>,
+    pub asked: Asked,
     /// Description of the readings and targets.
     pub problem: Arc<Problem>,
     /// Weights and biases of the network.
     pub weights: usize,
     /// Its test set.
-    pub test: TestSet,
+    pub test: TestView,
     /// Errors of the baselines.
     pub baselines: Baselines,
     /// Errors that the paper reports for this configuration.
@@ -73,18 +109,16 @@ impl RunView {
         let plan = recorded.map(|recorded| recorded.plan.clone());
         let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
         let setup = Setup::of(*run.settings(), plan).expect("a recorded run has its plan");
-        let asked = asked.unwrap_or_else(|| setup.clone());
         let baselines = run.baselines().cloned();
         Ok(Self {
             id,
             published: setup.settings().published(),
-            plan: asked.plan().map(|plan| Arc::new(plan.clone())),
-            asked,
+            asked: Asked::of(asked.as_ref().unwrap_or(&setup)),
             setup,
             search: recorded.and_then(|recorded| recorded.search.clone()),
             problem: Arc::clone(run.problem()),
             weights: run.leader().weights(),
-            test: TestSet::of(run, order)?,
+            test: TestView::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)?,
             baselines: baselines.expect("the baselines of a whole run are measured"),
             history: Vec::new(),
             outline: EpochOutline::default(),

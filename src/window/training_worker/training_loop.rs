@@ -3,7 +3,7 @@ use std::{
     path::Path,
     sync::{
         Arc,
-        atomic::Ordering,
+        atomic::{AtomicU64, Ordering},
         mpsc::{Receiver, TryRecvError},
     },
     time::{Duration, Instant},
@@ -33,12 +33,12 @@ use super::{
     Event, Origin, Progress, Request, RunId, RunResult, RunView, Start, TrainedRun,
     calibration::Calibration,
     keeping::{Keeping, question},
-    message::{Watched, continue_run, furthest_epoch},
+    message::{Preparing, continue_run, furthest_epoch},
     past_networks::PastNetworks,
 };
 use crate::window::{
     job::Report,
-    test_view::{TestSet, TestViewError},
+    test_view::{TestView, TestViewError},
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
@@ -48,7 +48,8 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 /// State of the thread.
 pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
-    watched: &'a Watched,
+    /// Number of the training last asked for.
+    newest: &'a AtomicU64,
     keeping: Keeping,
     /// Checkpoints of trainings that were cut short; the last is offered first.
     left: Vec<CheckpointPlace>,
@@ -60,7 +61,7 @@ struct Training {
     id: RunId,
     trained: TrainedRun,
     /// Its test set, ready to be drawn.
-    test: TestSet,
+    test: TestView,
     past: PastNetworks,
     stage: Stage,
     /// Reason why the training that has ended has no intervals.
@@ -81,10 +82,10 @@ enum Stage {
 }
 
 impl<'a> TrainingLoop<'a> {
-    pub(super) fn new(report: &'a Report<Event>, watched: &'a Watched, keeping: Keeping) -> Self {
+    pub(super) fn new(report: &'a Report<Event>, newest: &'a AtomicU64, keeping: Keeping) -> Self {
         Self {
             report,
-            watched,
+            newest,
             keeping,
             left: Vec::new(),
             current: None,
@@ -206,9 +207,15 @@ impl<'a> TrainingLoop<'a> {
     /// its networks.
     fn prepare(&self, id: RunId, origin: Origin) -> Result<(TrainedRun, RunView), String> {
         let report = self.report;
-        let is_cancelled = || self.watched.newest.load(Ordering::Relaxed) != id.0 || report.is_cancelled();
+        let is_cancelled = || self.newest.load(Ordering::Relaxed) != id.0 || report.is_cancelled();
         let job = Job::new(&is_cancelled);
-        let mut on_reading = |progress: Reading| report.progress(Event::Reading(progress), |_, _| ());
+        let on_work = |work, text, share| {
+            report.progress(Event::Preparing(Preparing { work, text, share }), |_, _| ());
+        };
+        let mut on_reading = |Reading { bytes, of }: Reading| {
+            let share = of.map(|of| bytes as f32 / of.max(1) as f32);
+            on_work("Reading", "Reading the recording".to_owned(), share);
+        };
         let here = Path::new("");
         let mut asked = None;
         let mut draw = |setup: &Setup, states| -> Result<TrainedRun, TestViewError> {
@@ -222,7 +229,7 @@ impl<'a> TrainingLoop<'a> {
                 let mut on_choosing = |progress| match progress {
                     ChoosingProgress::Reading(progress) => on_reading(progress),
                     ChoosingProgress::Trying(progress) => {
-                        report.progress(Event::Choosing(Box::new(progress)), |_, _| ());
+                        on_work("Choosing settings", progress.text, Some(progress.share as f32));
                     }
                 };
                 let fixed = AutoFixed::default();
@@ -376,7 +383,7 @@ impl Training {
         let answers = run.decouple_test();
         let errors = run.errors_of(&answers);
         let network_alone = run.scores().and_then(|scores| scores.network_alone);
-        let charts = self.test.recording().map(|test| Arc::new(test.charts(&answers)));
+        let charts = Arc::new(self.test.charts(&answers));
         let has_several = run.trainers().len() > 1;
         let starts = if has_several { run.starts() } else { Vec::new() };
         let cost = begun.elapsed();

@@ -9,7 +9,7 @@ use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Ro
 
 use super::figures::named_settings;
 use crate::window::{
-    shared::{Effect, PLACES, Shared},
+    shared::{Effect, PLACES, RunsRequest, Shared},
     theme::{space, type_size},
     widgets::{dim_ui, ghost_button, scrolled_ui, section_heading_ui},
 };
@@ -57,7 +57,7 @@ pub(super) fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u6
 fn confirm_ui(ui: &mut Ui, run: &KeptRun, removing: &mut Option<u64>, effects: &mut Vec<Effect>) {
     ui.label("Remove this run?");
     if ui.button("Remove").clicked() {
-        effects.push(Effect::RemoveRun(run.id));
+        effects.push(Effect::ChangeRuns(RunsRequest::Remove(run.id)));
         *removing = None;
     }
     if ui.button("Keep").clicked() {
@@ -75,7 +75,10 @@ fn buttons_ui(ui: &mut Ui, shared: &Shared, run: &KeptRun, removing: &mut Option
         response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_pinned, format!("{name} as {letter}")));
         let hint = if is_pinned { "Hide" } else { "Show on this side" };
         if response.on_hover_text(hint).clicked() {
-            effects.push(Effect::PinRun(place, (!is_pinned).then_some(run.id)));
+            effects.push(Effect::ChangeRuns(RunsRequest::Pin(
+                place,
+                (!is_pinned).then_some(run.id),
+            )));
         }
     }
     let can_take = !shared.phase.is_busy();
@@ -107,7 +110,7 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
     if !edit.has_focus() && typed.is_some() {
         ui.data_mut(|data| data.remove::<String>(id));
         if name != run.name {
-            effects.push(Effect::RenameRun(run.id, name));
+            effects.push(Effect::ChangeRuns(RunsRequest::Rename(run.id, name)));
         }
     }
 }

@@ -158,7 +158,7 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
     };
     let view = TableView::new("study table", &columns).sorted(look.sort).clickable();
     match view.show(ui, order.len(), row) {
-        Some(TableClick::Select(place) | TableClick::Open(place)) => look.marked = Some(page.rows[order[place]].item),
+        Some(TableClick::Select(place)) => look.marked = Some(page.rows[order[place]].item),
         Some(TableClick::Sort(sort)) => look.sort = sort,
         None => {}
     }

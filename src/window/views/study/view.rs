@@ -2,7 +2,7 @@ use decoupler_files::{
     export::atomic_write,
     figure::{Figure, SequentialMap},
 };
-use eframe::egui::{Align, Button, Key, Label, Layout, RichText, Ui, vec2};
+use eframe::egui::{Align, Button, Label, Layout, RichText, Ui, vec2};
 
 use super::{
     Form, Report, StudyView, Topic,
@@ -11,12 +11,9 @@ use super::{
     sweep_folder::FOLDER,
 };
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Shared, Shown},
+    shared::{Command, Effect, FileTask, FileWords, Shared, Shown},
     theme::{semibold, space, type_size},
-    widgets::{
-        card_ui, dim_ui, ghost_button, note_ui, primary_button_of, scrolled_ui, section_heading_ui, segmented_ui,
-        with_shortcut,
-    },
+    widgets::{card_ui, dim_ui, ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui},
 };
 
 const SPECIFICATION: FileWords = FileWords {
@@ -76,17 +73,18 @@ impl StudyView {
         let half = ((ui.available_width() - space(2)) / 2.0).floor();
         ui.horizontal(|ui| {
             let size = vec2(half, space(7));
-            let begin = ui.add_enabled(self.can_begin(), primary_button_of("▶ Run", size));
+            let begin_ui = |ui: &mut Ui| ui.add_sized(size, primary_button("▶ Run"));
+            let begin = ui.add_enabled_ui(self.can_begin(), begin_ui).inner;
             let why_not = match &self.running {
                 Some(topic) => format!("{} is under way", topic.name()),
                 None => "The note above says what to change".to_owned(),
             };
-            let hint = with_shortcut(ui, "Begins in the background", Key::Enter);
+            let hint = Command::Begin("Begin the study").about().tooltip(ui.ctx());
             if begin.on_hover_text(hint).on_disabled_hover_text(why_not).clicked() {
                 self.begin(effects);
             }
             let cancel = ui.add_enabled(self.running.is_some(), ghost_button("■ Cancel").min_size(size));
-            let hint = with_shortcut(ui, "Ends the work; what has finished is kept", Key::Period);
+            let hint = Command::Cancel("Cancel the study").about().tooltip(ui.ctx());
             if cancel.on_hover_text(hint).clicked() {
                 self.cancel();
             }
