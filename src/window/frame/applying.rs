@@ -14,11 +14,11 @@ use crate::window::{
         SourceKind, ToCopy, ViewKind,
     },
     theme,
-    training_worker::{LOST, Origin, Request, TrainedRun},
+    training_worker::{Asked, LOST, Origin, Request, RunView, TrainedRun},
     views::CHECKPOINT,
 };
 use decoupler_core::evaluation::RunSettings;
-use decoupler_files::import::Setup;
+use decoupler_files::import::{Plan, Setup};
 
 impl DecouplerWindow {
     /// Applies an effect requested by a view.
@@ -44,6 +44,7 @@ impl DecouplerWindow {
             Effect::ChooseSource(_) => {}
             Effect::TakeSetup(setup) => self.take_setup(&setup),
             Effect::ShowTraining => self.show(ViewKind::Train),
+            Effect::OpenRun(id) => self.open_run(id, true),
             Effect::Train => match shared.setup() {
                 Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
                     self.begin(Origin::Chosen(Box::new(setup)));
@@ -124,6 +125,59 @@ impl DecouplerWindow {
             self.restart_worker();
         }
         self.worker.begin(origin);
+    }
+
+    /// Opens a run of the list, chosen by the user or the last one after the start.
+    pub(super) fn open_run(&mut self, id: u64, is_chosen: bool) {
+        let runs = &self.shared.runs;
+        let Some(run) = runs.run(id).cloned() else { return };
+        let folder = runs.path.clone().unwrap_or_default();
+        let open = move |_: &_| {
+            let file = run.load(&folder).map_err(|error| error.to_string());
+            let opened = file.and_then(|file| RunView::kept(run.name.clone(), file));
+            let opened = opened.map_err(|error| format!("The run '{}' cannot be opened: {error}", run.name));
+            (is_chosen, opened.map(Box::new))
+        };
+        self.opening.start(open, |opened| {
+            opened.unwrap_or_else(|error| (true, Err(error.to_string())))
+        });
+    }
+
+    /// Shows a run of the list: with its settings if the user chose it, otherwise if it is of those on the left.
+    pub(super) fn take_opened(&mut self, is_chosen: bool, mut run: RunView) {
+        let shared = &mut self.shared;
+        if shared.phase.is_busy() {
+            return;
+        }
+        if !is_chosen {
+            let Ok(asked) = shared.asked() else { return };
+            // The history of readings may have been chosen with the settings.
+            let samples = |asked: &Asked| {
+                let mut plan = Plan::clone(asked.plan.as_ref()?);
+                plan.import.memory = None;
+                Some(plan)
+            };
+            let has_same = samples(&asked) == samples(&run.asked)
+                && (asked.plan.is_some() || have_same_test_set(&asked.settings, run.settings()));
+            if !has_same || shared.run.is_some() {
+                return;
+            }
+            if run.search.is_some() && shared.recording.is_automatic() {
+                run.asked = asked;
+            }
+        }
+        let setup = run.setup.clone();
+        shared.run = Some(run);
+        shared.phase = shared.phase_at_rest();
+        if is_chosen {
+            self.opened = None;
+            self.take_setup(&setup);
+            self.show(ViewKind::Train);
+        }
+        self.share_plan();
+        if self.shared.source == SourceKind::Array {
+            self.request_preview();
+        }
     }
 
     /// Starts the worker again after it died.

@@ -31,8 +31,19 @@ impl DecouplerWindow {
         while let Some(event) = self.previews.next_event() {
             self.take_preview(event);
         }
+        let was_listed = self.shared.runs.path.is_some();
         if let Some(notice) = self.shared.runs.take_events(&self.runs) {
             self.notices.add(Matter::RunList, notice);
+        }
+        let last = self.shared.runs.newest().map(|run| run.id);
+        if let (false, true, Some(last)) = (was_listed, self.shared.runs.path.is_some(), last) {
+            self.open_run(last, false);
+        }
+        match self.opening.next_event() {
+            Some((is_chosen, Ok(run))) => self.take_opened(is_chosen, *run),
+            Some((true, Err(reason))) => self.notices.fail(Matter::RunList, reason),
+            // The files of the last run may be gone, which the recording says.
+            Some((false, Err(_))) | None => {}
         }
         while let Some(written) = self.files.next_written() {
             self.report_written(written);
@@ -119,7 +130,7 @@ impl DecouplerWindow {
     }
 
     /// Shares the plan on the left with the training, if they have the same.
-    fn share_plan(&mut self) {
+    pub(super) fn share_plan(&mut self) {
         let asked = self.shared.asked();
         if let (Some(run), Ok(asked)) = (&mut self.shared.run, asked)
             && run.asked == asked

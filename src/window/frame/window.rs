@@ -17,7 +17,7 @@ use crate::{
     window::{
         job::{Background, Wake},
         preview::PreviewEvent,
-        shared::{Command, Effect, Matter, Notice, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
+        shared::{Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
         theme::{self, Theme, space},
         training_worker::{Request, Worker},
         views::Views,
@@ -41,6 +41,8 @@ pub struct DecouplerWindow {
     pub(super) keeping: Option<(PathBuf, Duration)>,
     pub(super) previews: Background<PreviewEvent>,
     pub(super) runs: RunsWorker,
+    /// The run of the list that is being opened, the last one after the start if not one that the user chose.
+    pub(super) opening: Background<(bool, Result<Box<RunView>, String>)>,
     pub(super) files: Files,
     /// Pictures that are drawn to be copied; the newest wins.
     pub(super) pictures: Background<Drawn>,
@@ -104,6 +106,7 @@ impl DecouplerWindow {
             keeping: None,
             previews: Background::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
+            opening: Background::new("opened run", Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
             pictures: Background::prompt("picture", Arc::clone(&wake)),
             dialogs: Dialogs::new(desktop, Arc::clone(&wake)),

@@ -22,6 +22,8 @@ pub enum Effect {
     TakeSetup(Box<Setup>),
     /// Show the Train view.
     ShowTraining,
+    /// Show the run of the list with this number in the Train view, with its settings.
+    OpenRun(u64),
     /// Begin training.
     Train,
     /// Open the training saved in this checkpoint.

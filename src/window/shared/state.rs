@@ -235,7 +235,9 @@ impl Shared {
     /// Returns true if the current training can continue from its present weights with the draft: its sets and networks
     /// must be the same. A paused training is resumed instead, unless the method or the stopping rules change.
     pub fn can_continue(&self) -> bool {
-        let (Some(run), Ok(mut asked)) = (self.shown_run(), self.asked()) else {
+        // The worker does not have a run of the list.
+        let run = self.shown_run().filter(|run| run.kept.is_none());
+        let (Some(run), Ok(mut asked)) = (run, self.asked()) else {
             return false;
         };
         let training = run.asked.settings.training;

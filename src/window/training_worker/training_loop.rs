@@ -14,16 +14,12 @@ use decoupler_core::{
         Intervals, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
         frame_us,
-        recorded::Determination,
     },
     job::Job,
     training::TrainingSettings,
 };
 use decoupler_files::{
-    export::{
-        CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
-        describe_worse_than_ridge,
-    },
+    export::{CheckpointFile, CheckpointPlace, NetworkFile, describe_samples},
     import::{ChoosingProgress, Progress as Reading, Setup, SetupSets},
     machine::system_cause,
 };
@@ -35,6 +31,7 @@ use super::{
     keeping::{Keeping, question},
     message::{Preparing, continue_run, furthest_epoch},
     past_networks::PastNetworks,
+    run_view::describe,
 };
 use crate::window::{
     job::Report,
@@ -435,20 +432,16 @@ impl Training {
         let Some(recorded) = &self.trained.recorded else {
             return Vec::new();
         };
-        let (targets, has_combined) = (&run.problem().targets, run.combined().is_some());
-        let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
         let mut remarks = self.trained.of_samples.clone();
-        remarks.extend(describe_determinacy(targets, &determined, has_combined));
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),
-                network_alone: has_combined.then(|| errors.clone()),
+                network_alone: run.combined().map(|_| errors.clone()),
                 baselines: baselines.clone(),
-                coverage: Vec::new(),
+                coverage: run.coverage().to_vec(),
             };
-            remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
+            remarks.extend(describe(run.problem(), run.test(), answers, &scores, recorded.plan.division.by));
         }
-        remarks.extend(describe_coverage(targets, run.coverage()));
         remarks.extend(self.no_intervals.clone());
         remarks
     }

@@ -81,12 +81,11 @@ fn buttons_ui(ui: &mut Ui, shared: &Shared, run: &KeptRun, removing: &mut Option
             )));
         }
     }
-    let can_take = !shared.phase.is_busy();
-    let take = ui.add_enabled(can_take, Button::new("Settings").min_size(size));
-    take.widget_info(|| WidgetInfo::labeled(Role::Button, can_take, format!("Use the settings of {name}")));
-    if take.on_hover_text("Uses its settings for the next training.").clicked() {
-        let setup = Box::new(run.summary.setup.clone());
-        effects.extend([Effect::TakeSetup(setup), Effect::ShowTraining]);
+    let can_open = !shared.phase.is_busy();
+    let open = ui.add_enabled(can_open, Button::new("Open").min_size(size));
+    open.widget_info(|| WidgetInfo::labeled(Role::Button, can_open, format!("Open {name}")));
+    if open.on_hover_text("Shows it in the Train view, with its settings.").clicked() {
+        effects.push(Effect::OpenRun(run.id));
     }
     let remove = ui.add(Button::new("Remove…").min_size(size));
     remove.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Remove {name}")));
