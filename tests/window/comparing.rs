@@ -285,14 +285,14 @@ fn saved_surfaces_use_the_current_camera() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.click("Turn");
     let first = saved_surfaces(&mut driver);
     assert!(
         first == saved_surfaces(&mut driver),
         "the same view gives the same picture"
     );
     let press = |driver: &mut Driver, key| {
-        driver.get("Actual surface").focus();
+        // The keys on the actual surface press it.
+        driver.get("Decoded surface").focus();
         driver.settle();
         driver.press(key);
     };

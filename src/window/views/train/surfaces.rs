@@ -7,32 +7,21 @@ use decoupler_files::{
         surface::{Surface, SurfaceFigure},
     },
 };
-use eframe::egui::{Align, Color32, Layout, Rect, RichText, Ui, Vec2};
+use eframe::egui::{Align, Color32, Layout, Rect, RichText, Ui};
 use glam::DVec2;
 
 use super::{
     charts::{SAMPLE, SECTION, lit_nodes},
-    press::{Hand, Shown},
+    press::Shown,
     view::TrainView,
 };
 use crate::window::{
-    shared::{Effect, Phase, RightCard, Shared, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
-    surface_view::{ColourBar, SurfaceView},
+    shared::{Effect, Phase, RightCard, Shared, SourceKind, surface_cards_ui, surface_ui, view_mode_ui},
+    surface_view::SurfaceView,
     test_view::Drawing,
     theme::{Theme, semibold, space, type_size},
-    widgets::{card_ui, dim_ui, explained_options_ui, placeholder_ui, segmented_ui},
+    widgets::{card_ui, dim_ui, placeholder_ui, segmented_ui},
 };
-
-/// Work of the pointer on the actual surface.
-const HANDS: [(Hand, &str, &str); 2] = [
-    (
-        Hand::Press,
-        "Press",
-        "Drag on the surface to press it; the wheel sets the depth. Drag with Shift or another button to move the picture, \
-         and the surface next to it to turn it.",
-    ),
-    (Hand::Turn, "Turn", "Drag to turn the surface; the wheel zooms."),
-];
 
 /// Both surfaces side by side with their colour scale; all targets of the sample if a recording has no surfaces.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -40,29 +29,16 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
         card_ui(ui, rect, |ui| sample_card_ui(ui, view, shared));
         return;
     }
-    let gap = space(2);
-    let (cards, scales) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
-    let width = 0.5 * (cards.width() - gap);
-    let left = cards.with_max_x(cards.left() + width);
-    let right = cards.with_min_x(left.right() + gap);
     let figure = surface_figure(view, shared);
-    for (card, place) in [left, right].into_iter().zip([Place::Actual, Place::Network]) {
-        card_ui(ui, card, |ui| {
-            head_ui(ui, place, view, shared, effects);
-            match figure.surfaces.get(place as usize) {
-                Some(surface) => surface_ui(ui, (surface, &figure), place, view, shared, effects),
-                None if place == Place::Network => invitation_ui(ui, view, shared),
-                None => {}
-            }
-        });
-    }
-    let (parts, note) = (figure.scales(), figure.note());
-    let part = scales.height() / parts.len().max(1) as f32;
-    for (index, scale) in parts.iter().enumerate() {
-        let top = scales.top() + part * index as f32;
-        let slot = Rect::from_x_y_ranges(scales.x_range(), top..=top + part).shrink2(Vec2::new(0.0, space(4)));
-        colour_scale_ui(ui, slot, scale, &note, shared.look, effects);
-    }
+    surface_cards_ui(ui, (rect, 2), &figure, shared.look, effects, |ui, index, effects| {
+        let place = [Place::Actual, Place::Network][index];
+        head_ui(ui, place, view, shared, effects);
+        match figure.surfaces.get(index) {
+            Some(surface) => side_ui(ui, (surface, &figure), place, view, shared, effects),
+            None if place == Place::Network => invitation_ui(ui, view, shared),
+            None => {}
+        }
+    });
 }
 
 /// Returns the displayed surfaces of the snapshot: the actual one, and the one of the network if there is one.
@@ -112,8 +88,8 @@ enum Place {
 /// The title of a card, if the options next to it leave room for it, and the options.
 fn head_ui(ui: &mut Ui, place: Place, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     let (title, note, options_width) = match place {
-        Place::Actual if view.press.is_pressing() => ("Actual", Some("pressed".to_owned()), space(56)),
-        Place::Actual => ("Actual", None, space(56)),
+        Place::Actual if view.press.is_pressing() => ("Actual", Some("pressed".to_owned()), space(36)),
+        Place::Actual => ("Actual", None, space(36)),
         Place::Network => ("Network", view.press.shown().and_then(Shown::network_time), space(36)),
     };
     ui.horizontal(|ui| {
@@ -129,14 +105,7 @@ fn head_ui(ui: &mut Ui, place: Place, view: &mut TrainView, shared: &Shared, eff
             }
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| match place {
-            Place::Actual => {
-                view_mode_ui(ui, shared.look, effects);
-                // Only sources with a sensor model can be pressed.
-                if shared.source == SourceKind::Array {
-                    let picked = explained_options_ui(ui, "Pointer on the surface", &HANDS, view.press.hand, false);
-                    view.press.hand = picked.unwrap_or(view.press.hand);
-                }
-            }
+            Place::Actual => view_mode_ui(ui, shared.look, effects),
             Place::Network => {
                 let options = [(RightCard::Decoupled, "Decoded"), (RightCard::Error, "Error")];
                 let picked = segmented_ui(ui, "Network card", &options, view.right, false);
@@ -159,7 +128,7 @@ fn invitation_ui(ui: &mut Ui, view: &TrainView, shared: &Shared) {
     placeholder_ui(ui, text);
 }
 
-fn surface_ui(
+fn side_ui(
     ui: &mut Ui,
     (surface, figure): (&Surface, &SurfaceFigure),
     place: Place,
@@ -167,28 +136,24 @@ fn surface_ui(
     shared: &Shared,
     effects: &mut Vec<Effect>,
 ) {
-    let (array, look, theme) = (shared.skin(), shared.look, Theme::of(ui));
+    let (array, look) = (shared.skin(), shared.look);
+    // Only sources with a sensor model can be pressed.
+    let is_touched = place == Place::Actual && array.is_some();
     let surface_view = SurfaceView {
         label: &format!("{} surface", surface.title),
         surface,
-        marked_node: figure.marked_node,
-        lit_nodes: &figure.lit_nodes,
-        section: figure.section.as_ref(),
-        theme,
+        figure,
+        is_touched,
     };
-    let is_touched = place == Place::Actual && view.press.hand == Hand::Press && array.is_some();
-    let shown = match is_touched {
-        true => surface_view.show_touched(ui, look.camera),
-        false => surface_view.show(ui, look.camera),
-    };
+    let mut marked = figure.marked_node;
+    let shown = surface_ui(ui, surface_view, look, &mut marked, effects);
     let response = &shown.response;
     if let (Place::Actual, Some(skin)) = (place, array) {
         view.press.take_target(&shown, surface);
         let (painter, pointer) = (ui.painter(), response.hover_pos());
-        view.press.outline_ui(painter, &theme.palette, pointer, skin.stroke_mm);
+        view.press
+            .outline_ui(painter, &Theme::of(ui).palette, pointer, skin.stroke_mm);
     }
-    let mut marked = figure.marked_node;
-    follow_surface(&shown, look, &mut marked, effects);
     if marked != figure.marked_node {
         view.lights.node = marked.and_then(|node| item_at(shared, node));
     }

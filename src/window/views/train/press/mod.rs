@@ -33,8 +33,6 @@ pub use solving::Shown;
 /// The finger, what it presses, and everything known about that.
 #[derive(Debug)]
 pub struct PressState {
-    /// Work of the pointer on the actual surface.
-    pub hand: Hand,
     /// The finger that presses.
     pub finger: Finger,
     /// Place that it presses; `None` while the test set is displayed.
@@ -58,7 +56,6 @@ impl PressState {
     /// Nothing pressed. `wake` is called when something was computed in the background.
     pub fn new(wake: &Wake) -> Self {
         Self {
-            hand: Hand::default(),
             finger: Finger::default(),
             place_mm: None,
             grip_mm: None,
@@ -171,16 +168,6 @@ struct Target {
     rect: Rect,
     sight: Sight,
     surface: Surface,
-}
-
-/// Work of the pointer on the actual surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Hand {
-    /// It presses.
-    #[default]
-    Press,
-    /// It turns the surface.
-    Turn,
 }
 
 /// The ball that presses.

@@ -2,7 +2,7 @@ use decoupler_files::figure::surface::Ray;
 use eframe::egui::{Context, Key, Modifiers, Painter, PointerButton, Pos2, Response, Shape, Stroke, pos2};
 use glam::{DVec2, DVec3};
 
-use super::{Hand, PressState, Target};
+use super::{PressState, Target};
 use crate::window::{test_view::Skin, theme::Palette};
 
 /// Share of the stroke per point of scrolling: the whole stroke takes about ten notches of a typical wheel.
@@ -26,8 +26,7 @@ impl PressState {
         let (Some(target), Some(skin)) = (target, skin) else {
             return;
         };
-        let response = ctx.read_response(target.id).filter(|_| self.hand == Hand::Press);
-        let Some(response) = response else {
+        let Some(response) = ctx.read_response(target.id) else {
             self.grip_mm = None;
             return;
         };
@@ -84,7 +83,7 @@ impl PressState {
     /// Draws where the ball touches the surface, and the line from there to the top of the axes: at the touch, otherwise
     /// under the pointer.
     pub fn outline_ui(&self, painter: &Painter, palette: &Palette, pointer: Option<Pos2>, stroke_mm: f64) {
-        let Some(target) = self.target.as_ref().filter(|_| self.hand == Hand::Press) else {
+        let Some(target) = &self.target else {
             return;
         };
         let hovered = || {

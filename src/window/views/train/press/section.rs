@@ -56,7 +56,10 @@ pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
         None => {
             // The surface shows it too: in a low window the error table comes first.
             if ui.clip_rect().height() > space(70) {
-                dim_ui(ui, "Press on the actual surface; the wheel sets the depth.");
+                dim_ui(
+                    ui,
+                    "Press on the actual surface; the wheel sets the depth. Drag with the right button or Shift to turn it.",
+                );
             }
             return;
         }

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::window::{
     job::Wake,
-    shared::{Effect, FileInUse, FileTask, Matter, Notice, RecordingDraft, Shared, SourceKind},
+    shared::{Effect, FileInUse, FileTask, Matter, Notice, RecordingDraft, RunsRequest, Shared, SourceKind},
     training_worker::RunId,
 };
 use decoupler_core::{
@@ -293,7 +293,7 @@ impl RecordingEditor {
                 let name = file.source_name();
                 let text = format!("The settings of {name} are set. Its run is listed in Compare.");
                 effects.push(Effect::Notify(Matter::Recording, Notice::Done(text)));
-                effects.extend((!is_listed).then(|| Effect::KeepRun(file)));
+                effects.extend((!is_listed).then(|| Effect::ChangeRuns(RunsRequest::Keep(file))));
             }
             Opened::Checkpoint(path) => effects.push(Effect::OpenTraining(path)),
         }
