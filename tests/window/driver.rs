@@ -32,15 +32,7 @@ use crate::rasterise::Rasteriser;
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Parts of the configuration that are folded away at first.
-const FOLDED: [&str; 7] = [
-    "Scene",
-    "Samples",
-    "Geometry",
-    "Network inputs",
-    "When to stop",
-    "Method settings",
-    "Figures of the paper",
-];
+const FOLDED: [&str; 3] = ["Scene", "Samples", "Advanced"];
 
 /// Label of the button that closes a notice.
 const DISMISS: &str = "Dismiss";
@@ -143,7 +135,7 @@ impl Driver {
 
     /// Chooses the paper's scene and waits for its surface.
     pub(crate) fn choose_papers_scene(&mut self) {
-        self.click("Paper's scene");
+        self.click("Paper");
         self.get("Hidden nodes").scroll_to_me();
         self.wait("the paper's surface", |driver| {
             let preview = driver.state().preview.as_ref();
@@ -531,7 +523,7 @@ impl Driver {
 
     /// Configures a small network on the smallest array of the paper, which is trained quickly.
     pub(crate) fn configure_small(&mut self) {
-        self.click("Paper's scene");
+        self.click("Paper");
         self.click("10×6");
         self.enter("Hidden nodes", "6");
         self.enter("Training samples", "200");
@@ -541,8 +533,8 @@ impl Driver {
         self.wait("the small array's surface", |driver| {
             driver
                 .state()
-                .test()
-                .is_some_and(|test| test.sensor == wanted.simulation().unwrap().sensor)
+                .skin()
+                .is_some_and(|skin| skin.sensor == wanted.simulation().unwrap().sensor)
         });
     }
 

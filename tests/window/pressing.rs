@@ -181,6 +181,11 @@ fn the_other_decoders_answer_alongside_the_network() {
     driver.train();
     driver.wait_for_last_epoch();
     driver.act(PRESS);
+    driver.wait("the mean's answer", |driver| {
+        driver.says("Training mean, worst mm: 0.") && driver.says("Network, worst mm: 0.")
+    });
+    assert!(!driver.says("Newton, "), "folded until asked for");
+    driver.click("Other decoders");
     driver.wait("Newton's answer", |driver| {
         driver
             .texts()
@@ -213,7 +218,7 @@ fn a_newcomer_presses_before_any_training_and_a_demo_network_answers() {
     let mut driver = Driver::open();
     driver.configure_small();
     assert!(driver.says("Press the surface on the left"));
-    driver.click_button("Press it");
+    driver.act("Press the middle of the surface");
     driver.wait("the demo network's answer", |driver| driver.says("Network, mean mm: "));
     assert!(driver.has(DECODED) && driver.has(DEMO));
     let rest_mm = 0.8 * 0.5;

@@ -111,7 +111,6 @@ impl<'a> Fields<'a> {
             }
         }
     }
-
 }
 
 /// The folded settings that are rarely changed: geometry, inputs of the network, and training. `is_new` is false for a paused

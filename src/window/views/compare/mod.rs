@@ -204,7 +204,7 @@ impl CompareView {
                 surface_ui(ui, view, shared.look, &mut self.node, effects);
             }
             (Some(Ok(compared)), None) => {
-                let targets = compared.test.recording().map_or(&[][..], |test| &test.problem.targets);
+                let targets = &compared.test.problem.targets;
                 target_choice_ui(ui, "Target", &format!("target of {letter}"), targets, &mut side.target);
                 if let Some(chart) = &chart {
                     plots_ui(ui, &format!("Regression of {letter}"), chart, Pointer::Moves);

@@ -11,21 +11,21 @@ use eframe::egui::{Align, Color32, Layout, Rect, RichText, Ui};
 use glam::DVec2;
 
 use super::{
-    charts::{SAMPLE, SECTION, has_target_surface, lit_nodes},
+    charts::{SAMPLE, SECTION, lit_nodes},
     press::Shown,
     view::TrainView,
 };
 use crate::window::{
     shared::{Effect, Phase, RightCard, Shared, SourceKind, surface_cards_ui, surface_ui, view_mode_ui},
     surface_view::SurfaceView,
-    test_view::{Drawing, Positions},
+    test_view::Drawing,
     theme::{Theme, semibold, space, type_size},
-    widgets::{card_ui, dim_ui, ghost_button, placeholder_ui, segmented_ui},
+    widgets::{card_ui, dim_ui, placeholder_ui, segmented_ui},
 };
 
 /// Both surfaces side by side with their colour scale; all targets of the sample if a recording has no surfaces.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
-    if shared.source == SourceKind::Recording && !has_target_surface(shared) {
+    if shared.source == SourceKind::Recording && through(shared).is_none() {
         card_ui(ui, rect, |ui| sample_card_ui(ui, view, shared));
         return;
     }
@@ -60,17 +60,14 @@ pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
             None => Some(item),
         }),
         lit_nodes: lit_nodes(view, shared),
-        section: shared.test().filter(|_| is_cut).map(|test| view.section.section(test)),
+        section: shared.skin().filter(|_| is_cut).map(|skin| view.section.section(skin)),
     }
     .with_common_scales()
 }
 
 /// The surface through the targets of a recording.
-fn through(shared: &Shared) -> Option<&TargetSurface> {
-    match &shared.recorded_test()?.positions {
-        Positions::Surface(through) => Some(through),
-        _ => None,
-    }
+pub(super) fn through(shared: &Shared) -> Option<&TargetSurface> {
+    shared.test()?.through()
 }
 
 /// Returns the item at a node of a surface: the node itself, or the target there.
@@ -119,7 +116,7 @@ fn head_ui(ui: &mut Ui, place: Place, view: &mut TrainView, shared: &Shared, eff
 }
 
 /// The invitation on a card without a network: to press, which a small network answers, or to train.
-fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+fn invitation_ui(ui: &mut Ui, view: &TrainView, shared: &Shared) {
     let text = if view.press.is_pressing() {
         view.press.waiting_text(shared)
     } else if shared.phase.is_busy() {
@@ -129,15 +126,6 @@ fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
          its surface take shape here."
     };
     placeholder_ui(ui, text);
-    if let Some(test) = shared.test().filter(|_| !view.press.is_pressing()) {
-        ui.vertical_centered(|ui| {
-            ui.add_space(space(3));
-            let hint = "Presses a ball onto the middle of the surface.";
-            if ui.add(ghost_button("Press it")).on_hover_text(hint).clicked() {
-                view.press.press_middle(test);
-            }
-        });
-    }
 }
 
 fn side_ui(
@@ -148,7 +136,7 @@ fn side_ui(
     shared: &Shared,
     effects: &mut Vec<Effect>,
 ) {
-    let (array, look) = (shared.test(), shared.look);
+    let (array, look) = (shared.skin(), shared.look);
     // Only sources with a sensor model can be pressed.
     let is_touched = place == Place::Actual && array.is_some();
     let surface_view = SurfaceView {
@@ -160,22 +148,22 @@ fn side_ui(
     let mut marked = figure.marked_node;
     let shown = surface_ui(ui, surface_view, look, &mut marked, effects);
     let response = &shown.response;
-    if let (Place::Actual, Some(test)) = (place, array) {
+    if let (Place::Actual, Some(skin)) = (place, array) {
         view.press.take_target(&shown, surface);
         let (painter, pointer) = (ui.painter(), response.hover_pos());
         view.press
-            .outline_ui(painter, &Theme::of(ui).palette, pointer, test.stroke_mm);
+            .outline_ui(painter, &Theme::of(ui).palette, pointer, skin.stroke_mm);
     }
     if marked != figure.marked_node {
         view.lights.node = marked.and_then(|node| item_at(shared, node));
     }
     // A pressed surface is cut too.
     let is_chosen = response.clicked() || (is_touched && response.is_pointer_button_down_on());
-    if let (true, Some(test)) = (is_chosen && figure.section.is_some(), array)
+    if let (true, Some(skin)) = (is_chosen && figure.section.is_some(), array)
         && let (Some(at), Some(sight)) = (response.interact_pointer_pos(), shown.sight)
         && let Some(place) = surface.pick(&sight.ray(DVec2::new(f64::from(at.x), f64::from(at.y))))
     {
-        view.section.choose_at(place.truncate(), test);
+        view.section.choose_at(place.truncate(), skin);
     }
     shown.node_tooltip_ui(|ui, node| {
         if let Some(drawing) = view.drawing() {
@@ -186,10 +174,10 @@ fn side_ui(
 
 /// The node under the pointer and its values, in two lines that hide little.
 fn node_values_ui(ui: &mut Ui, drawing: &Drawing, shared: &Shared, node: usize) {
-    let target = || shared.recorded_test()?.problem.targets.get(item_at(shared, node)?);
-    let (title, [name, found], unit) = if let Some(test) = shared.test() {
-        let per_row = test.sensor.scale.nodes_per_row();
-        let row = test.rows.get(node / per_row).map_or(0, |row| row + 1);
+    let target = || shared.test()?.problem.targets.get(item_at(shared, node)?);
+    let (title, [name, found], unit) = if let Some(skin) = shared.skin() {
+        let per_row = skin.sensor.scale.nodes_per_row();
+        let row = skin.rows.get(node / per_row).map_or(0, |row| row + 1);
         let title = format!("Row {row}, node {}", node % per_row + 1);
         (title, ["z", "decoded"], " mm".to_owned())
     } else if let Some(target) = target() {
@@ -229,7 +217,7 @@ fn sample_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
         let title = format!("Test sample {}", view.snapshot + 1);
         ui.label(RichText::new(title).font(semibold(type_size().title)));
     });
-    if let Some(Positions::NoSurface(reason)) = shared.recorded_test().map(|test| &test.positions) {
+    if let Some(Err(reason)) = shared.test().and_then(|test| test.through.as_ref()) {
         let text = format!("No surface goes through the positions of the targets: {reason}.");
         dim_ui(ui, &text);
     }
