@@ -184,7 +184,7 @@ fn empty_views_fill_on_a_click() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.click_button("Compare");
-    assert!(driver.is_enabled("Train a network now"));
+    assert!(driver.says("Every finished training is kept here"));
     driver.click_button("Study");
     driver.settle();
     assert!(driver.is_enabled("Run now"));

@@ -21,15 +21,15 @@ use decoupler_core::{
     settings::{Field, Kind, Setting, Value},
     text::counted,
 };
-use eframe::egui::{Align, Align2, ComboBox, TextEdit, Ui, vec2};
+use eframe::egui::{Align, Align2, TextEdit, Ui, vec2};
 
 use super::{
     glossary,
     theme::space,
     widgets::{
         fields::{
-            capitalised, count_ui, field_ui, in_percent, input_text, list_ui, options_ui, percent_ui, quantity_ui,
-            seed_ui, usually,
+            capitalised, combo_ui, count_ui, field_ui, in_percent, input_text, list_ui, options_ui, percent_ui,
+            quantity_ui, seed_ui, usually,
         },
         fold_ui,
     },
@@ -189,7 +189,12 @@ impl Row {
         let picked = match look {
             Look::Options(_) => options_ui(ui, label, hint, &choices, selected),
             Look::List(_) => list_ui(ui, label, hint, &choices, selected),
-            _ => list_below_ui(ui, label, hint, &choices, selected),
+            _ => {
+                let (named, width) = (ui.label(label).on_hover_text(hint), ui.available_width());
+                let mut picked = None;
+                combo_ui(ui, label, width, &choices, selected, &mut picked).labelled_by(named.id);
+                picked
+            }
         };
         if let Some(picked) = picked {
             let set = setting.set(settings, &Value::Text(picked.to_owned()));
@@ -263,31 +268,4 @@ fn number_ui<S: Clone>(ui: &mut Ui, texts: [&str; 3], setting: &Setting<S>, of: 
         }
         Some(Field::Text(..)) | None => {}
     }
-}
-
-/// A list below its name, as wide as the form. Returns the value just selected.
-fn list_below_ui(
-    ui: &mut Ui,
-    label: &str,
-    hint: &str,
-    choices: &[(&'static str, &str, &str)],
-    selected: &str,
-) -> Option<&'static str> {
-    let named = ui.label(label).on_hover_text(hint);
-    let shown = choices.iter().find(|(name, ..)| *name == selected);
-    let combo = ComboBox::from_id_salt(label)
-        .selected_text(shown.map_or("", |(_, text, _)| *text))
-        .width(ui.available_width())
-        .height(space(90));
-    let mut picked = None;
-    let combo = combo.show_ui(ui, |ui| {
-        for &(name, text, meaning) in choices {
-            let choice = ui.selectable_label(name == selected, text).on_hover_text(meaning);
-            if choice.clicked() && name != selected {
-                picked = Some(name);
-            }
-        }
-    });
-    combo.response.labelled_by(named.id);
-    picked
 }
