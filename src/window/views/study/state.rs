@@ -124,7 +124,8 @@ impl StudyView {
             SourceKind::Array => shared.draft,
             SourceKind::Recording => shared.recording.settings,
         };
-        let basis: Basis = (shared.source, settings, shared.recording.plan.clone());
+        let plan = shared.recording.plan.clone().map(|plan| plan.0);
+        let basis: Basis = (shared.source, settings, plan);
         let plan = |basis: &Basis| basis.2.as_ref().map(Arc::as_ptr).map_err(String::clone);
         let is_same = |on: &Basis| (on.0, on.1, plan(on)) == (basis.0, basis.1, plan(&basis));
         if self.checked_on.as_ref().is_some_and(is_same) {

@@ -2,7 +2,7 @@ use decoupler_files::{
     export::{atomic_write, format_duration},
     figure::{Figure, SequentialMap},
 };
-use eframe::egui::{Align, Button, Key, Label, Layout, RichText, Ui, vec2};
+use eframe::egui::{Align, Button, Label, Layout, RichText, Ui, vec2};
 
 use super::{
     Form, Report, StudyView, Topic,
@@ -11,11 +11,11 @@ use super::{
     sweep_folder::FOLDER,
 };
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Shared, Shown},
+    shared::{Command, Effect, FileTask, FileWords, Shared, Shown},
     theme::{semibold, space, type_size},
     widgets::{
-        card_ui, dim_ui, ghost_button, invitation_ui, note_ui, primary_button_of, progress_bar_ui, scrolled_ui,
-        section_heading_ui, segmented_ui, with_shortcut,
+        card_ui, dim_ui, ghost_button, invitation_ui, note_ui, primary_button, progress_bar_ui, scrolled_ui,
+        section_heading_ui, segmented_ui,
     },
 };
 
@@ -73,18 +73,18 @@ fn buttons_ui(ui: &mut Ui, view: &mut StudyView, verb: &str, effects: &mut Vec<E
     let half = ((ui.available_width() - space(2)) / 2.0).floor();
     ui.horizontal(|ui| {
         let size = vec2(half, space(7));
-        let begin = primary_button_of(format!("▶ {verb}"), size);
-        let begin = ui.add_enabled(view.can_begin(), begin);
+        let begin_ui = |ui: &mut Ui| ui.add_sized(size, primary_button(format!("▶ {verb}")));
+        let begin = ui.add_enabled_ui(view.can_begin(), begin_ui).inner;
         let why_not = match &view.running {
             Some(topic) => format!("{} is under way", topic.name()),
             None => "The note above says what to change".to_owned(),
         };
-        let hint = with_shortcut(ui, "Begins in the background", Key::Enter);
+        let hint = Command::Begin("Begin the study").about().tooltip(ui.ctx());
         if begin.on_hover_text(hint).on_disabled_hover_text(why_not).clicked() {
             view.begin(effects);
         }
         let cancel = ui.add_enabled(view.running.is_some(), ghost_button("■ Cancel").min_size(size));
-        let hint = with_shortcut(ui, "Ends the work; what has finished is kept", Key::Period);
+        let hint = Command::Cancel("Cancel the study").about().tooltip(ui.ctx());
         if cancel.on_hover_text(hint).clicked() {
             view.cancel();
         }
