@@ -10,7 +10,7 @@ use decoupler_files::{
     figure::tick_text,
     import::{ColumnKind, ColumnSummary, InspectedFile, Meaning, Variable},
 };
-use eframe::egui::{Color32, ComboBox, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2, vec2};
+use eframe::egui::{Color32, Rect, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2, vec2};
 
 use super::{
     editor::RecordingEditor,
@@ -18,7 +18,7 @@ use super::{
 };
 use crate::window::{
     theme::{Palette, Theme, space},
-    widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView, fields::options_of_combo_ui},
+    widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView, fields::combo_ui},
 };
 
 const MEANING_WIDTH: f32 = space(23);
@@ -108,7 +108,7 @@ fn heading_row<'a>(
             if button.clicked() {
                 changed.set(Some(Box::new(move |import| import.wanted = Some((file, name)))));
             }
-        } else if let Some(meaning) = meaning_ui(ui, &format!("{whole} {name}"), "set all…", &OF_ALL, None) {
+        } else if let Some(meaning) = meaning_ui(ui, &format!("{whole} {name}"), &OF_ALL, None) {
             let change = move |import: &mut Import| import.set_meanings(file, columns, meaning);
             changed.set(Some(Box::new(change)));
         }
@@ -139,8 +139,7 @@ fn column_row<'a>(
     let names = [name.clone(), format!("Unit of {name}"), format!("Histogram of {name}")];
     let [of_meaning, of_unit, of_histogram] = names;
     let meaning_cell = move |ui: &mut Ui| {
-        let text = meaning.to_string();
-        if let Some(picked) = meaning_ui(ui, &of_meaning, &text, Meaning::ALL, Some(meaning)) {
+        if let Some(picked) = meaning_ui(ui, &of_meaning, Meaning::ALL, Some(meaning)) {
             let change = move |import: &mut Import| import.set_meanings(file, column..column + 1, picked);
             changed.set(Some(Box::new(change)));
         }
@@ -180,19 +179,17 @@ fn column_row<'a>(
     row.named(name)
 }
 
-/// A choice of the meaning `of` something. Returns the one newly picked.
-fn meaning_ui(ui: &mut Ui, of: &str, text: &str, offered: &[Meaning], shown: Option<Meaning>) -> Option<Meaning> {
-    let palette = Theme::of(ui).palette;
-    let is_unused = shown == Some(Meaning::Unused);
-    let text = RichText::new(text).color(if is_unused { palette.dim } else { palette.text });
+/// A choice of the meaning `of` something; of several columns if none is `shown`. Returns the one newly picked.
+fn meaning_ui(ui: &mut Ui, of: &str, offered: &[Meaning], shown: Option<Meaning>) -> Option<Meaning> {
     let names = Vec::from_iter(offered.iter().map(Meaning::to_string));
     let options = offered.iter().zip(&names);
-    let options = Vec::from_iter(options.map(|(&option, name)| (option, name.as_str(), explanation(option))));
-    let combo = ComboBox::from_id_salt(of).selected_text(text).width(MEANING_WIDTH);
-    let (button, picked) = options_of_combo_ui(ui, combo, &options, shown);
-    let label = format!("Meaning of {of}");
+    let options = options.map(|(&option, name)| (Some(option), name.as_str(), explanation(option)));
+    let all = shown.is_none().then_some((None, "set all…", ""));
+    let options = Vec::from_iter(all.into_iter().chain(options));
+    let (label, mut picked) = (format!("Meaning of {of}"), None);
+    let button = combo_ui(ui, &label, MEANING_WIDTH, &options, shown, &mut picked);
     ui.ctx().accesskit_node_builder(button.id, |node| node.set_label(label));
-    picked
+    picked.flatten()
 }
 
 fn explanation(meaning: Meaning) -> &'static str {
