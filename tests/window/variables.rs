@@ -113,7 +113,7 @@ fn variables_are_listed_with_their_shapes_and_chosen_by_name() {
     // The rows of a variable that is left out become the samples.
     driver.click_button("Use the rows of gauge");
     driver.wait("its columns", |driver| driver.has("Meaning of gauge.c1"));
-    assert!(!driver.has("Meaning of push") && driver.has("Meaning of variable skin"));
+    assert!(!driver.has("Meaning of push") && driver.has("Use the rows of skin"));
     driver.mean("gain", "target");
     driver.wait("the samples", |driver| driver.says("Training: 40"));
     assert_eq!(meaning(&driver, "gauge.c2").as_deref(), Some("input"));
