@@ -30,13 +30,13 @@ pub trait View: Debug {
         Vec::new()
     }
 
-    /// Shows its tools at the right of the top bar, from right to left.
+    /// Shows its tools at the right of the top bar.
     fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Shows its column on the left.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
-    /// Shows its column on the right, where [`ViewKind::has_report`] has one.
+    /// Shows its column on the right, where [`Shared::has_report`] is true.
     fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Shows its middle. Returns the status line at the bottom, or `None` for that of the training.
@@ -79,15 +79,7 @@ impl ViewKind {
         const KEYS: [Key; 5] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5];
         KEYS[self as usize]
     }
-
-    /// Returns true if it has a column on the right in a window of this width in points.
-    pub fn has_report(self, window_width: f32) -> bool {
-        self == Self::Train && window_width >= MIN_WIDTH_FOR_REPORT
-    }
 }
-
-/// Width of a window, in points, from which a column on the right leaves the middle enough room.
-pub const MIN_WIDTH_FOR_REPORT: f32 = 1400.0;
 
 /// Status of a view, shown in the line at the bottom.
 #[derive(Clone, Debug, PartialEq)]
