@@ -49,11 +49,11 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
     assert!(at_rest > 40 && deepest_mm > 0.2, "{at_rest} at rest, {deepest_mm} mm");
 
-    driver.click("Paper's scene");
+    driver.click("Paper");
     assert_eq!(driver.state().draft, RunSettings::default());
     driver.wait("the published errors", |driver| driver.has("Published"));
     shows_the_baselines_of(&driver, RunSettings::default());
-    driver.click("Indenter's print");
+    driver.click("Press demo");
     assert_eq!(driver.state().draft, opened);
 }
 
@@ -82,6 +82,7 @@ fn nouns_after_one_are_singular() {
     );
     driver.enter("Hidden nodes", "1");
     driver.wait("the array", |driver| driver.says("1 unknown, 1 equation per frame"));
+    driver.act("Chart: Readings");
     driver.wait("its readings", |driver| driver.says("1 row-wire × 1 column-wire"));
     let texts = driver.texts();
     let plural = |text: &&String| {
@@ -184,13 +185,13 @@ fn empty_views_fill_on_a_click() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.click_button("Compare");
-    assert!(driver.is_enabled("Train a network now"));
+    assert!(driver.says("Every finished training is kept here"));
     driver.click_button("Study");
     driver.settle();
-    assert!(driver.is_enabled("Run now"));
+    assert!(driver.is_enabled("▶ Run"));
     driver.click("Speed against accuracy");
     driver.settle();
-    assert!(driver.is_enabled("Measure now"));
+    assert!(driver.is_enabled("▶ Run"));
     driver.click_button("Train");
     driver.settle();
     driver.click("▶ Train");
@@ -199,7 +200,7 @@ fn empty_views_fill_on_a_click() {
     });
     driver.click_button("Study");
     driver.click("Table 1");
-    driver.click_button("Run now");
+    driver.click_button("▶ Run");
     driver.wait("the experiment", |driver| driver.is_enabled("■ Cancel"));
     driver.click("■ Cancel");
 }

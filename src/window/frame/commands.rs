@@ -143,7 +143,6 @@ impl DecouplerWindow {
     fn take_drafts(&mut self, done: &str, taken: Option<Drafts>) {
         let Some(taken) = taken else { return };
         let text = format!("{done}: {}", difference(&taken, &drafts(&self.shared)));
-        self.notices.add(Matter::Settings, Notice::Done(text));
         if !matches!(self.shared.shown, ViewKind::Train | ViewKind::Sensor) {
             self.show(ViewKind::Train);
         }
@@ -157,6 +156,7 @@ impl DecouplerWindow {
         self.shared.recording = recording;
         self.shared.draft = draft;
         self.choose_source(source);
+        self.notices.add(Matter::Settings, Notice::Done(text));
     }
 }
 

@@ -25,6 +25,7 @@ use crate::{
         theme::{self, Theme, space},
         training_worker::{Request, Worker},
         views::Views,
+        widgets::focus_ring_ui,
     },
 };
 
@@ -256,6 +257,12 @@ impl DecouplerWindow {
         let parts = [Some(&middle.response), report.as_ref().map(|report| &report.response)];
         for part in parts.into_iter().flatten() {
             card_menu_ui(part, || view.shown(shared), &mut effects);
+        }
+        let focused = ui.memory(|memory| memory.focused());
+        let focused = focused.and_then(|id| ui.ctx().read_response(id));
+        // The edge of a column.
+        if let Some(edge) = focused.filter(|focused| focused.rect.height() >= form.response.rect.height()) {
+            focus_ring_ui(ui, &edge);
         }
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();

@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use decoupler_core::{evaluation::TestErrors, text::capitalised, training::StopReason};
-use decoupler_files::export::{format_duration, format_number, format_percent};
+use decoupler_files::export::{format_duration, format_percent};
 use eframe::egui::{Ui, WidgetInfo, accesskit::Role};
 
 use super::{Command, Effect, Phase, RunView, Shared, SourceKind, Status, Tone};
@@ -95,7 +95,7 @@ fn phase_in_words(shared: &Shared) -> Status {
 }
 
 fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
-    let (Some(latest), Some(result)) = (run.latest(), &run.result) else {
+    let Some(result) = &run.result else {
         return Vec::new();
     };
     let (epochs, epochs_run) = (run.settings().training.stopping.epochs, result.epochs_run);
@@ -105,12 +105,6 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
             TestErrors::Nodes(_) => format!("z error {}", format_percent(result.errors.percent())),
             TestErrors::Targets(_) => format!("error {} of range", format_percent(result.errors.percent())),
         },
-        format!("mse {}", format_number(latest.training_mse)),
-        format!(
-            "{} {}",
-            run.settings().training.method.parameter_name(),
-            format_number(latest.parameter)
-        ),
     ];
     if run.settings().starts > 1 && phase.is_busy() {
         parts.push(format!(

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use eframe::egui::{Align, Key, Layout, RichText, Sense, Ui, Vec2};
+use eframe::egui::{Align, Key, Label, Layout, RichText, Sense, TextStyle, TextWrapMode, Ui, Vec2, WidgetText};
 
 use super::{Effect, FileInUse, Offers, Shared, Shown};
 use crate::window::{
@@ -126,9 +126,16 @@ impl Status {
             ui.spacing_mut().item_spacing.x = space(4);
             let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
             ui.painter().circle_filled(dot.center(), 4.0, colour);
-            ui.label(RichText::new(&self.text).size(type_size().note));
+            let text = |text: &str| RichText::new(text).size(type_size().note);
+            ui.add(Label::new(text(&self.text)).truncate());
+            let for_progress = self.progress.map_or(0.0, |_| space(44));
             for note in &self.notes {
-                ui.label(RichText::new(note).size(type_size().note).color(palette.dim));
+                let note = text(note).color(palette.dim);
+                let note = WidgetText::from(note).into_galley(ui, Some(TextWrapMode::Extend), 0.0, TextStyle::Body);
+                // What does not fit is left out, not cut.
+                if note.size().x < ui.available_width() - for_progress {
+                    ui.label(note);
+                }
             }
             if let Some((name, share)) = self.progress {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

@@ -16,7 +16,7 @@ use self::{
 };
 use crate::window::{
     job::Wake,
-    plotting::{Pointer, plots_ui, titled_plots_ui},
+    plotting::{plots_ui, titled_plots_ui},
     shared::{
         Effect, NetworkSource, PLACES, RightCard, RunList, RunsRequest, Shared, Shown, Status, View, surface_cards_ui,
         surface_ui, target_choice_ui, view_mode_ui,
@@ -211,7 +211,7 @@ impl CompareView {
                 let targets = &compared.test.problem.targets;
                 target_choice_ui(ui, "Target", &format!("target of {letter}"), targets, &mut side.target);
                 if let Some(chart) = &chart {
-                    plots_ui(ui, &format!("Regression of {letter}"), chart, Pointer::Moves);
+                    plots_ui(ui, &format!("Regression of {letter}"), chart);
                 }
             }
             (Some(Err(reason)), None) => {

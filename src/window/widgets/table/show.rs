@@ -278,11 +278,7 @@ impl<'a> Lines<'a> {
                     ui.scroll_to_rect(line.expand2(vec2(0.0, line.height())), None);
                 }
                 response = response.on_hover_cursor(CursorIcon::PointingHand);
-                click = match (response.double_clicked(), response.clicked()) {
-                    (true, _) => Some(TableClick::Open(place)),
-                    (false, true) => Some(TableClick::Select(place)),
-                    (false, false) => None,
-                };
+                click = response.clicked().then_some(TableClick::Select(place));
             }
         }
         if !is_last {
