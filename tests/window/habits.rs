@@ -144,4 +144,10 @@ fn undo_says_what_it_undid_and_shows_it() {
     driver.settle();
     assert!(driver.says("Redone: hidden"), "{:#?}", driver.texts());
     assert_eq!(driver.state().draft.hidden, 7);
+    driver.harness().run_steps(80);
+    driver.click("Best accuracy");
+    driver.harness().run_steps(80);
+    driver.act("Undo change of settings");
+    driver.settle();
+    assert!(driver.says("Undone: preset Best accuracy"), "{:#?}", driver.texts());
 }

@@ -10,6 +10,7 @@ use super::{
     modal::{Modal, Palette},
 };
 use crate::window::{
+    forms::preset_between,
     shared::{Command, Effect, Look, Matter, Notice, Offer, Offers, RecordingDraft, Shared, SourceKind, ViewKind},
     test_view::HeightScale,
 };
@@ -142,7 +143,13 @@ impl DecouplerWindow {
     /// Takes settings that were undone or redone, says what has changed, and shows it.
     fn take_drafts(&mut self, done: &str, taken: Option<Drafts>) {
         let Some(taken) = taken else { return };
-        let text = format!("{done}: {}", difference(&taken, &drafts(&self.shared)));
+        let present = drafts(&self.shared);
+        let [before, after] = if done == "Undone" {
+            [&taken, &present]
+        } else {
+            [&present, &taken]
+        };
+        let text = format!("{done}: {}", difference(before, after));
         if !matches!(self.shared.shown, ViewKind::Train | ViewKind::Sensor) {
             self.show(ViewKind::Train);
         }
@@ -171,21 +178,22 @@ pub(super) fn drafts(shared: &Shared) -> Drafts {
     (shared.source, shared.draft, shared.recording.clone())
 }
 
-/// Returns the names of the settings that differ: "hidden, epochs".
-fn difference(one: &Drafts, other: &Drafts) -> String {
+/// Returns what was changed: "hidden, epochs", "preset Best accuracy".
+fn difference(before: &Drafts, after: &Drafts) -> String {
     let settings = |(source, draft, recording): &Drafts| match source {
         SourceKind::Array => *draft,
         SourceKind::Recording => recording.settings,
     };
-    let [a, b] = [one, other].map(settings);
+    let [a, b] = [before, after].map(settings);
     let mut names: Vec<_> = RUN_OPTIONS.iter().map(|option| &option.setting).collect();
     names.retain(|setting| setting.get(&a) != setting.get(&b));
     match &names[..] {
-        _ if one.0 != other.0 => "source of the samples".to_owned(),
-        [] if one.2.plan != other.2.plan => "import".to_owned(),
-        [] if one.2.is_auto != other.2.is_auto => "automatic settings".to_owned(),
+        _ if before.0 != after.0 => "source of the samples".to_owned(),
+        [] if before.2.plan != after.2.plan => "import".to_owned(),
+        [] if before.2.is_auto != after.2.is_auto => "automatic settings".to_owned(),
         [] if a.source != b.source => "sensor or scene".to_owned(),
         [] => "settings of the method".to_owned(),
+        [_, _, ..] if let Some(preset) = preset_between(&a, &b) => format!("preset {preset}"),
         [first, second, third, _, ..] => format!("{}, {}, {} and others", first.name, second.name, third.name),
         few => Vec::from_iter(few.iter().map(|setting| setting.name)).join(", "),
     }

@@ -45,6 +45,7 @@ pub(super) fn top_bar_ui(
         let before = ui.data(|data| data.get_temp(id)).unwrap_or(0.0);
         ui.add_space((ui.available_width() - before).max(0.0));
         let reached = ui.horizontal(|ui| {
+            ui.set_height(space(7));
             let mut reached = None;
             let mut button_ui = |ui: &mut Ui, command: Command, text: &str| {
                 reached = reached.take().or(command_button_ui(ui, offers, command, text));
