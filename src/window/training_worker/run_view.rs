@@ -2,17 +2,17 @@ use std::sync::Arc;
 
 use decoupler_core::{
     dataset::SplitBy,
-    evaluation::{Baselines, ErrorTable, PublishedErrors, Run, RunSettings, Scores, StartRecord, auto::AutoRecord},
+    evaluation::{Baselines, ErrorTable, PublishedErrors, RunSettings, Scores, StartRecord, auto::AutoRecord},
     problem::Problem,
     training::{EpochRecord, Stage, StopReason},
 };
 use decoupler_files::{
     figure::EpochOutline,
-    import::{Plan, Recorded, Setup},
+    import::{Plan, Setup},
 };
 
 use super::{
-    message::{Progress, RunId, RunResult, append_epochs},
+    message::{Progress, RunId, RunResult, TrainedRun, append_epochs},
     past_networks::PastNetworks,
 };
 use crate::window::test_view::{TestView, TestViewError};
@@ -64,17 +64,15 @@ impl RunView {
     ///
     /// # Errors
     /// If its test set cannot be drawn.
-    pub fn begun(
-        id: RunId,
-        run: &Run,
-        recorded: Option<&Recorded>,
-        asked: Option<Setup>,
-    ) -> Result<Self, TestViewError> {
+    pub fn begun(id: RunId, trained: &TrainedRun, asked: Option<Setup>) -> Result<Self, TestViewError> {
+        let (run, recorded) = (&trained.run, trained.recorded.as_ref());
         let plan = recorded.map(|recorded| recorded.plan.clone());
         let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
         let setup = Setup::of(*run.settings(), plan).expect("a recorded run has its plan");
         let asked = asked.unwrap_or_else(|| setup.clone());
         let baselines = run.baselines().cloned();
+        let mut test = TestView::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)?;
+        test.timeline = trained.timeline.clone().unwrap_or(test.timeline);
         Ok(Self {
             id,
             published: setup.settings().published(),
@@ -84,7 +82,7 @@ impl RunView {
             search: recorded.and_then(|recorded| recorded.search.clone()),
             problem: Arc::clone(run.problem()),
             weights: run.leader().weights(),
-            test: TestView::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)?,
+            test,
             baselines: baselines.expect("the baselines of a whole run are measured"),
             history: Vec::new(),
             outline: EpochOutline::default(),
