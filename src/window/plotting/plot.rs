@@ -27,15 +27,6 @@ const MIN_GRID: f32 = 8.0;
 /// Points of a stepped line that are closer than this fraction of an axis are merged: a sharp turn would draw a spike.
 const COINCIDENT: f64 = 5e-4;
 
-/// Response of a plot to the pointer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pointer {
-    /// The pointer pans and zooms the plot and shows the tooltip of a point.
-    Moves,
-    /// The points and bars respond to the pointer.
-    Picks,
-}
-
 /// Plot drawn on the screen.
 pub struct DrawnPlot<'a> {
     /// Plot that is drawn.
@@ -90,7 +81,7 @@ impl DrawnPlot<'_> {
 /// Draws a title and the plots.
 pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
     ui.label(RichText::new(title).font(semibold(type_size().title)));
-    plots_ui(ui, title, figure, Pointer::Moves);
+    plots_ui(ui, title, figure);
 }
 
 /// Room for the names and the numbers of plots below each other, and for their horizontal axis.
@@ -103,7 +94,7 @@ const NOTES_WIDTH: f32 = space(48);
 
 /// Draws the plots side by side in the remaining space, and the legend and the notes: next to a square plot if there is room,
 /// else above.
-pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
+pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnPlot<'a>> {
     let head_ui = |ui: &mut Ui| {
         legend_ui(ui, figure);
         for note in &figure.notes {
@@ -150,7 +141,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
         }
         let track = figure.is_stacked.then_some(is_last);
         let mut slot = ui.new_child(UiBuilder::new().max_rect(slot));
-        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, (pointer, track));
+        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, track);
         let mut drawn = DrawnPlot {
             plot,
             has_pointer: response.contains_pointer(),
@@ -196,7 +187,7 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
 
 /// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window. `track` is whether a plot among
 /// several below each other is the last one, which has the horizontal axis of all.
-fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, (pointer, track): (Pointer, Option<bool>)) -> (PlotTransform, Response) {
+fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
@@ -210,7 +201,8 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, (pointer, track): (Pointer, Option<
             .tick_label_color(palette.dim)
             .tick_label_font(FontId::proportional(type_size().small))
     };
-    let may_move = pointer == Pointer::Moves && track.is_none();
+    // Plots below each other are moved together by whoever draws them.
+    let may_move = track.is_none();
     let mut y_hints = axis_hints(AxisHints::new_y(), &plot.y, 12.0);
     if track.is_some() {
         // The names are beside the plots, and their frames are below each other.
@@ -234,6 +226,7 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, (pointer, track): (Pointer, Option<
         .allow_drag(may_move)
         .allow_zoom(may_move)
         .allow_boxed_zoom(may_move)
+        .allow_double_click_reset(may_move)
         .show_crosshair(false)
         .label_formatter(|position| tooltip_at(plot, position).filter(|_| may_move && !is_covered))
         .set_margin_fraction(Vec2::ZERO)

@@ -8,7 +8,7 @@ use decoupler_files::{
 };
 use eframe::egui::{Response, Ui};
 
-use super::plot::{Pointer, plots_ui};
+use super::plot::plots_ui;
 use crate::window::theme::space;
 
 /// Targets shown one below the other: more would be too flat.
@@ -70,7 +70,7 @@ impl SeriesView {
         name: impl Fn(usize) -> String,
     ) -> Option<usize> {
         let figure = self.figure(series, Self::tracks(ui), marked);
-        let plots = plots_ui(ui, id, &figure, Pointer::Moves);
+        let plots = plots_ui(ui, id, &figure);
         let all = SeriesView::default().range(series);
         let mut clicked = None;
         for (track, plot) in plots.iter().enumerate() {

@@ -15,7 +15,7 @@ use super::{
     view::TrainView,
 };
 use crate::window::{
-    plotting::{MAX_TRACKS, Pointer, SeriesView, cells_ui, plots_ui},
+    plotting::{MAX_TRACKS, SeriesView, cells_ui, plots_ui},
     shared::{Command, Effect, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
     test_view::TestView,
     theme::{Theme, space},
@@ -344,7 +344,7 @@ impl Chart {
             Figure::Surfaces(_) => return,
         };
         // Each chart is zoomed by itself.
-        let drawn = plots_ui(ui, self.name, plots, Pointer::Moves);
+        let drawn = plots_ui(ui, self.name, plots);
         let Some(plot) = drawn.iter().find(|plot| plot.has_pointer) else {
             return;
         };
