@@ -49,16 +49,10 @@ impl Timeline {
         });
         let group = |place: usize| recording.set.groups()[samples[place]];
         let has_groups = plan.import.has_groups();
-        let longest = times
-            .as_deref()
-            .and_then(median_interval)
-            .map(|interval| 5.0 * interval);
-        let is_gap = |place: &usize| {
-            let interval = times.as_ref().map_or(0.0, |times| times[*place] - times[*place - 1]);
-            let is_other_group = has_groups && group(*place) != group(*place - 1);
-            is_other_group || interval < 0.0 || longest.is_some_and(|longest| interval > longest)
-        };
-        let gaps = Vec::from_iter((1..samples.len()).filter(is_gap));
+        let mut gaps = times.as_deref().map_or_else(Vec::new, gaps);
+        gaps.extend((1..samples.len()).filter(|&place| has_groups && group(place) != group(place - 1)));
+        gaps.sort_unstable();
+        gaps.dedup();
         let group_name = |place: usize| {
             let name = recording.group_names.get(group(place)).map(String::as_str);
             match (&plan.import.group, name) {
@@ -115,14 +109,12 @@ impl Timeline {
     }
 }
 
-/// Returns the median of the intervals between neighbours, apart from those of zero.
-fn median_interval(times: &[f64]) -> Option<f64> {
-    let mut intervals = Vec::from_iter(
-        times
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .filter(|interval| *interval > 0.0),
-    );
-    intervals.sort_unstable_by(f64::total_cmp);
-    intervals.get(intervals.len() / 2).copied()
+/// Returns the first samples after gaps in these times: steps back, and more than five times the median interval.
+pub fn gaps(times: &[f64]) -> Vec<usize> {
+    let intervals = Vec::from_iter(times.windows(2).map(|pair| pair[1] - pair[0]));
+    let mut steps = Vec::from_iter(intervals.iter().copied().filter(|interval| *interval > 0.0));
+    steps.sort_unstable_by(f64::total_cmp);
+    let longest = steps.get(steps.len() / 2).map_or(f64::INFINITY, |median| 5.0 * median);
+    let is_gap = |place: &usize| intervals[place - 1] < 0.0 || intervals[place - 1] > longest;
+    (1..times.len()).filter(is_gap).collect()
 }
