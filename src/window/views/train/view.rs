@@ -31,7 +31,7 @@ use crate::window::{
 impl View for TrainView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
-        self.decoders.follow(shared);
+        self.decoders.follow_training(shared);
         self.scrub.follow(shared, effects);
     }
 
@@ -202,7 +202,7 @@ impl TrainView {
             press: PressState::new(&wake),
             scrub: ScrubState::new(Arc::clone(&wake)),
             recording: RecordingEditor::new(&wake),
-            decoders: Decoders::new(wake),
+            decoders: Decoders::new(wake, &[]),
         }
     }
 
