@@ -99,7 +99,7 @@ fn settings_ui(
     });
     let has_recorded_rows = is_recording && recording.has_row_wires();
     ui.add_enabled_ui(is_open, |ui| {
-        forms::advanced_ui(ui, fields, is_new, has_recorded_rows, size)
+        forms::advanced_ui(ui, fields, is_new, has_recorded_rows, size);
     });
 }
 
