@@ -231,12 +231,16 @@ impl DecouplerWindow {
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| ui.max_rect());
-        let form = Panel::left("configuration")
+        // A narrow window does not change the width in a wide one.
+        let is_narrow = ui.available_width() < 1400.0;
+        let form = Panel::left(if is_narrow { "narrow form" } else { "form" })
             .default_size(self.chosen.form_points.unwrap_or(space(68)))
             .size_range(within(form_min, space(110), for_form))
             .frame(panel(side))
             .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
-        self.chosen.form_points = Some(form.response.rect.width());
+        if !is_narrow {
+            self.chosen.form_points = Some(form.response.rect.width());
+        }
         let report = has_report.then(|| {
             let for_report = ui.available_width();
             Panel::right("report")
