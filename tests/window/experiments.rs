@@ -357,8 +357,14 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     driver.settle();
     assert!(driver.says("samples"), "the recording has no number of samples to vary");
     driver.choose("Down", "Scaling");
+    for scaling in ["Minmax", "Whiten"] {
+        driver.click(scaling);
+    }
+    assert!(driver.says("there are no values for scaling"), "{:#?}", driver.texts());
+    for scaling in ["Minmax", "Whiten"] {
+        driver.click(scaling);
+    }
     driver.type_into("Values across", "4 12");
-    driver.type_into("Values down", "minmax whiten");
     driver.enter("Epochs", "5");
     run_to_the_end(&mut driver);
     let alone = trained(&plan(&path));

@@ -26,7 +26,8 @@ use decoupler_files::{
 use eframe::egui::Ui;
 
 use super::{
-    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label,
+    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList,
+    value_list::{label, write_percent},
 };
 use crate::window::{
     shared::Effect,
@@ -118,9 +119,12 @@ impl ExperimentForm {
     /// If the form is not a valid experiment.
     pub fn task(&self, train: &Result<Setup, String>) -> Result<Task, String> {
         let (experiment, setup) = self.experiment(train)?;
+        let mut results = ExperimentResults::new(experiment.clone());
+        write_percent(&mut results.experiment.axis);
+        results.experiment.second_axis.as_mut().map(write_percent);
         let outcome = ExperimentOutcome {
             heading: self.heading.clone(),
-            results: ExperimentResults::new(experiment.clone()),
+            results,
             plan: setup.plan().cloned(),
             kept_bytes: 0,
         };
@@ -269,7 +273,18 @@ impl Outcome for ExperimentOutcome {
 
     fn report(&self, _limits: &TradeOffLimits) -> Report {
         let results = &self.results;
-        let shown = ExperimentTable::new(results);
+        let mut shown = ExperimentTable::new(results);
+        let mut table = shown.table();
+        // Y is constant.
+        while let Some(place) = table
+            .columns
+            .iter()
+            .position(|column| column.title().starts_with("Y %"))
+        {
+            shown.kinds.remove(place);
+            table.columns.remove(place);
+            table.rows.iter_mut().for_each(|row| drop(row.remove(place)));
+        }
         let row = |(item, cell): (usize, &Cell)| {
             let both = cell.percent().median.zip(cell.linear_percent());
             let loses = both.is_some_and(|(network, linear)| network > linear);
@@ -311,7 +326,7 @@ impl Outcome for ExperimentOutcome {
             pages: vec![Page {
                 what: "Cell",
                 rows: results.cells.iter().enumerate().map(row).collect(),
-                table: shown.table(),
+                table,
                 figure: Some(experiment_figure(results)),
                 notes,
                 ..Page::default()

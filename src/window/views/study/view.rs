@@ -130,7 +130,7 @@ impl StudyView {
         if has_notes {
             let gap = if share > 0.0 { space(2) } else { 0.0 };
             card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
-                scrolled_ui(ui, "notes", |ui| notes_ui(ui, page, look));
+                scrolled_ui(ui, "notes", |ui| notes_ui(ui, page));
             });
         }
     }
