@@ -93,12 +93,11 @@ fn a_table_ends_with_the_librarys_own_numbers() {
             }
         }
     }
-    assert_eq!(compared, 2 * 8, "nothing is published for these sizes");
+    assert_eq!(compared, 2 * 7, "nothing is published for these sizes");
     let remarks = [describe_failures(&results), describe_worse_than_mean(&results)].concat();
     for remark in &remarks {
         assert!(driver.has(remark), "{remark}");
     }
-    assert_eq!(driver.has("Remarks"), !remarks.is_empty());
     driver.settle();
 
     for _ in 0..2 {

@@ -273,18 +273,7 @@ impl Outcome for ExperimentOutcome {
 
     fn report(&self, _limits: &TradeOffLimits) -> Report {
         let results = &self.results;
-        let mut shown = ExperimentTable::new(results);
-        let mut table = shown.table();
-        // Y is constant.
-        while let Some(place) = table
-            .columns
-            .iter()
-            .position(|column| column.title().starts_with("Y %"))
-        {
-            shown.kinds.remove(place);
-            table.columns.remove(place);
-            table.rows.iter_mut().for_each(|row| drop(row.remove(place)));
-        }
+        let shown = ExperimentTable::new(results);
         let row = |(item, cell): (usize, &Cell)| {
             let both = cell.percent().median.zip(cell.linear_percent());
             let loses = both.is_some_and(|(network, linear)| network > linear);
@@ -314,9 +303,7 @@ impl Outcome for ExperimentOutcome {
             .into_iter()
             .map(|text| Note::Line(Tone::Warning, text));
         let mut notes = Vec::from_iter(failures.chain(remarks));
-        if !notes.is_empty() {
-            notes.insert(0, Note::Heading("Remarks"));
-        } else if self.parts().0 == 0 && results.experiment.second_axis.is_none() {
+        if self.parts().0 == 0 && results.experiment.second_axis.is_none() {
             let text = "Our figures appear next to the published ones as the trials finish.";
             notes.push(Note::Line(Tone::Dim, text.to_owned()));
         }
@@ -326,7 +313,7 @@ impl Outcome for ExperimentOutcome {
             pages: vec![Page {
                 what: "Cell",
                 rows: results.cells.iter().enumerate().map(row).collect(),
-                table,
+                table: shown.table(),
                 figure: Some(experiment_figure(results)),
                 notes,
                 ..Page::default()

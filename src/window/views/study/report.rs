@@ -118,9 +118,12 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
             TableColumn::text(title)
         };
         let texts = texts.iter().map(|row| row[place].as_str());
-        column
-            .meaning(table.columns[place].meaning)
-            .width(ColumnWidth::of_longest(texts))
+        let column = column.meaning(table.columns[place].meaning);
+        match place {
+            // Its dots take room, too.
+            0 => column,
+            _ => column.width(ColumnWidth::of_longest(texts)),
+        }
     };
     let columns = Vec::from_iter(titles.iter().map(String::as_str).enumerate().map(column));
     // Texts are sorted by their places in the list of values.

@@ -346,13 +346,7 @@ impl Level {
     }
 
     fn notes(&self, limits: &TradeOffLimits) -> Vec<Note> {
-        let remarks = self.measured.points.iter().flat_map(|point| {
-            let remarks = point.report.remarks.iter();
-            remarks.map(move |remark| format!("{}: {remark}", point_name(point)))
-        });
-        let remarks = remarks.chain(self.refused.iter().cloned());
-        let mut notes = Vec::from_iter(remarks.map(|remark| Note::Line(Tone::Warning, sentence(&remark))));
-        notes.push(Note::Heading("Recommended decoders"));
+        let mut notes = vec![Note::Heading("Recommended decoders")];
         let questions = [
             ("Fastest", "No measured decoder is this accurate."),
             ("Most accurate", "No measured decoder is this fast."),
@@ -367,6 +361,18 @@ impl Level {
             let (name, percent) = (point_name(point), format_percent(percent));
             notes.push(Note::Line(Tone::Own, format!("{question}: {name}, {percent}, {time}")));
         }
+        // A remark is the same in both precisions.
+        let double = self
+            .measured
+            .points
+            .iter()
+            .filter(|point| point.report.precision == Precision::Double);
+        let remarks = double.flat_map(|point| {
+            let remarks = point.report.remarks.iter();
+            remarks.map(move |remark| format!("{}: {remark}", point_name(point)))
+        });
+        let remarks = remarks.chain(self.refused.iter().cloned());
+        notes.extend(remarks.map(|remark| Note::Line(Tone::Warning, sentence(&remark))));
         notes
     }
 }
