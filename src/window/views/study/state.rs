@@ -206,7 +206,12 @@ impl StudyView {
         let under_way = |topic| Some((topic, self.studies.get(&topic)?));
         let Some((topic, study)) = self.running.and_then(under_way) else {
             let Some((study, took)) = self.study().and_then(|study| Some((study, study.took?))) else {
-                return Status::new(Tone::Calm, "Ready: press Run");
+                let text = if self.can_begin() {
+                    "Ready: press Run"
+                } else {
+                    "Not ready"
+                };
+                return Status::new(Tone::Calm, text);
             };
             let (done, all, _) = study.outcome.parts();
             let (tone, ended) = match done < all {
