@@ -140,9 +140,14 @@ fn unnamed(driver: &mut Driver) -> Vec<String> {
 /// Returns the visible texts that reach past the side of what they are drawn in, or past the window.
 fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
     let screen = driver.harness().ctx.content_rect();
-    let tables = driver.harness().query_all(By::new().role(Role::Table));
     // Tables scroll to the side.
-    let tables = Vec::from_iter(tables.map(|table| table.rect().expand(2.0)));
+    let nodes = driver.harness().root().children_recursive();
+    let of_tables = nodes.filter(|node| {
+        let node = node.accesskit_node();
+        let is_sorting = || node.label().is_some_and(|label| label.starts_with("Sort by "));
+        matches!(node.role(), Role::Cell | Role::ColumnHeader) || is_sorting()
+    });
+    let cells = Vec::from_iter(of_tables.map(|node| node.rect().expand(2.0)));
     let mut cuts = BTreeSet::new();
     for ClippedShape { clip_rect, shape, .. } in &driver.harness().output().shapes {
         each_text(shape, &mut |text| {
@@ -151,7 +156,7 @@ fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
             let is_visible = parent.intersects(place) && !text.galley.text().trim().is_empty();
             // Rounding to pixels is no cut; what a scroll bar hides above and below comes into sight.
             let is_cut = place.left() < parent.left() - 1.5 || place.right() > parent.right() + 1.5;
-            let is_in_table = tables.iter().any(|table| table.contains_rect(place.intersect(parent)));
+            let is_in_table = cells.iter().any(|cell| cell.contains(place.center()));
             if is_visible && is_cut && !is_in_table && text.angle == 0.0 {
                 cuts.insert(text.galley.text().to_owned());
             }

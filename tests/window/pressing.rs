@@ -245,6 +245,7 @@ fn a_newcomer_presses_before_any_training_and_a_demo_network_answers() {
 #[test]
 fn the_demo_network_is_useful_on_every_array_of_the_paper() {
     let mut driver = Driver::open();
+    driver.act("Chart: Readings");
     for (array, columns) in [("10×6", 18), ("10×8", 24), ("10×10", 30)] {
         driver.click(array);
         let readings = format!("10 row-wires × {columns} column-wires");
