@@ -11,7 +11,7 @@ use super::{
     sweep_folder::FOLDER,
 };
 use crate::window::{
-    shared::{Command, Effect, FileTask, FileWords, Shared, Shown},
+    shared::{Command, Effect, FileTask, FileWords, Shared, Shown, ViewKind},
     theme::{semibold, space, type_size},
     widgets::{card_ui, dim_ui, ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui},
 };
@@ -181,7 +181,7 @@ impl StudyView {
         }
         if open.clicked() {
             effects.extend(study.outcome.open(look.page, item));
-            effects.push(Effect::ShowTraining);
+            effects.push(Effect::Show(ViewKind::Train));
         }
     }
 
