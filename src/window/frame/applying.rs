@@ -268,7 +268,11 @@ impl DecouplerWindow {
                     }
                     None => take(Ok(None)),
                 }
-                let used = self.files_in_use(&task);
+                let used = if task.is_read() {
+                    Vec::new()
+                } else {
+                    self.files_in_use(&task)
+                };
                 self.files.write(ToWrite { task, path, asks }, used, move |path| {
                     let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
                     taken?(path)

@@ -20,8 +20,8 @@ use crate::window::{
     job::Wake,
     plotting::SeriesView,
     shared::{
-        Command, Effect, Holdings, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind, Status, Unfinished,
-        View, run_buttons_ui,
+        Command, Effect, Holdings, NetworkSource, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind,
+        Status, Unfinished, View, run_buttons_ui,
     },
     test_view::{Drawing, TestView},
     theme::space,
@@ -75,6 +75,12 @@ impl View for TrainView {
         }
         if offers.offer(Command::OpenFiles, !phase.is_busy()) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
+        }
+        let ended = shared.shown_run().filter(|run| run.stop_reason.is_some());
+        if offers.offer(Command::DecodeFile, ended.is_some())
+            && let Some(run) = ended
+        {
+            effects.push(Effect::ChooseFile(NetworkSource::of(run).decode()));
         }
         if let Some(skin) = shared.skin()
             && offers.offer(Command::PressMiddle, true)
