@@ -257,6 +257,7 @@ fn a_checkpoint_shows_the_wall_time_of_all_starts_or_none() {
             let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());
             result.is_some_and(|result| result.wall_time == file.wall_time)
         });
+        driver.details();
         let texts = driver.texts();
         for (name, value) in [("Training, all restarts", all), ("Time per epoch", an_epoch)] {
             let place = texts.iter().rposition(|text| text == name).unwrap();
@@ -421,6 +422,7 @@ fn bayesian_regularisation_says_how_many_weights_the_data_determine() {
     let effective = leader.history()[leader.best_epoch()].effective_parameters.unwrap();
     let weights = leader.weights();
     let text = format!("Effective parameters {} of {weights} weights", format_number(effective));
+    driver.details();
     assert!(driver.has(&text), "{text} is not in {:#?}", driver.texts());
     choose_method(&mut driver, "Levenberg-Marquardt");
     driver.train();
@@ -439,6 +441,7 @@ fn the_spread_and_continue_fit_in_narrow_windows() {
         buttons.windows(2).all(|pair| pair[0].right() <= pair[1].left()),
         "{buttons:?}"
     );
+    driver.details();
     let column = driver.get("ERRORS ON THE TEST SET").rect().left();
     let of_spread = |text: &str| text.starts_with("test Z %, ");
     let places: Vec<_> = driver

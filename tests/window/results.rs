@@ -359,7 +359,11 @@ fn the_wheel_zooms_the_values_over_time_and_a_click_goes_to_a_sample() {
         folder: _folder,
         ..
     } = trained_on(probe);
-    let x = "x (mm) against time (s): 90 % interval, actual, decoded";
+    let x = driver
+        .texts()
+        .into_iter()
+        .find(|text| text.starts_with("x (mm) against time (s): "));
+    let x = &*x.unwrap();
     let whole = driver.get(x).accesskit_node().description().unwrap();
     let middle = driver.get(x).rect().center();
     driver.harness().hover_at(middle);

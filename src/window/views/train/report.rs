@@ -15,7 +15,7 @@ use decoupler_files::{
         search_table,
     },
     figure::frame_time,
-    import::{Plan, Setup},
+    import::Setup,
 };
 use eframe::egui::{Align, Button, Frame, Layout, Margin, Response, RichText, Stroke, Ui, WidgetInfo, accesskit::Role};
 
@@ -103,7 +103,7 @@ fn previous_ui(ui: &mut Ui, run: &RunView, effects: &mut Vec<Effect>) {
         }
         let hint = "Goes back to the settings of this result.";
         if ui.add(ghost_button("Undo changes")).on_hover_text(hint).clicked() {
-            let plan = run.asked.plan.as_ref().map(|plan| Plan::clone(plan));
+            let plan = run.asked.plan.as_deref().map(|plan| (**plan).clone());
             let setup = Setup::of(run.asked.settings, plan).expect("it was that of a training");
             effects.push(Effect::TakeSetup(Box::new(setup)));
             effects.push(Effect::ChooseAutomatically(run.search.is_some()));
