@@ -356,11 +356,11 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     driver.settle();
     assert!(driver.says("samples"), "the recording has no number of samples to vary");
     driver.choose("Down", "Scaling");
-    for scaling in ["Minmax", "Whiten"] {
+    for scaling in ["Min-max", "Whitening"] {
         driver.click(scaling);
     }
     assert!(driver.says("there are no values for scaling"), "{:#?}", driver.texts());
-    for scaling in ["Minmax", "Whiten"] {
+    for scaling in ["Min-max", "Whitening"] {
         driver.click(scaling);
     }
     driver.type_into("Values across", "4 12");

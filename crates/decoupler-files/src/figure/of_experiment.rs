@@ -36,7 +36,7 @@ pub fn experiment_figure(results: &ExperimentResults) -> Figure {
 fn error_name(results: &ExperimentResults) -> (&'static str, &'static str) {
     match results.experiment.recording {
         None => ("Z error", "%"),
-        Some(_) => ("mean absolute error", "% of range"),
+        Some(_) => ("MAE", "% of range"),
     }
 }
 

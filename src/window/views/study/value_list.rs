@@ -1,13 +1,11 @@
 use decoupler_core::{
-    dataset::SplitBy,
     evaluation::experiments::{Axis, AxisKind},
-    network::{Quantity, ScalingChoice},
-    settings::{Kind, Method, SettingError, Value},
-    text::{Named, capitalised},
+    settings::{Kind, SettingError, Value},
 };
 use eframe::egui::{TextEdit, Ui, vec2};
 
 use crate::window::{
+    forms::choices,
     theme::space,
     widgets::fields::{in_percent, input_text, of_percent},
 };
@@ -68,18 +66,8 @@ impl ValueList {
     pub fn ui(&mut self, ui: &mut Ui, name: Option<&str>, hint: &str) {
         let label = ui.label(name.unwrap_or(label(self.kind))).on_hover_text(hint);
         let choices = match self.kind {
-            AxisKind::Inputs => names::<Quantity>(),
-            AxisKind::Scaling => names::<ScalingChoice>(),
-            AxisKind::Split => names::<SplitBy>(),
-            AxisKind::Method => {
-                let text = |method: &Method| format!("{} ({})", method.name(), method.short_name());
-                let methods = Method::all();
-                methods
-                    .iter()
-                    .map(|method| (method.short_name(), text(method)))
-                    .collect()
-            }
-            _ => Vec::new(),
+            AxisKind::Split => vec![("time", "Time"), ("group", "Group"), ("random", "Random")],
+            kind => choices(kind.name()),
         };
         if choices.is_empty() {
             let edit = TextEdit::multiline(&mut self.values)
@@ -93,16 +81,11 @@ impl ValueList {
         let mut chosen = Vec::new();
         for (name, text) in choices {
             let mut is_chosen = self.words().any(|word| word == name);
-            ui.checkbox(&mut is_chosen, text);
+            ui.checkbox(&mut is_chosen, text).on_hover_text(name);
             chosen.extend(is_chosen.then_some(name));
         }
         self.values = chosen.join(", ");
     }
-}
-
-/// Returns the names of the variants, and what the window calls them.
-fn names<T: Named>() -> Vec<(&'static str, String)> {
-    T::ALL.iter().map(|one| (one.name(), capitalised(one.name()))).collect()
 }
 
 /// Writes levels of noise in percent, as they are typed; the values of no other setting have fractions.

@@ -11,7 +11,7 @@ use super::{
     sweep_folder::FOLDER,
 };
 use crate::window::{
-    shared::{Command, Effect, FileTask, FileWords, Shared, Shown},
+    shared::{Command, Effect, FileTask, FileWords, Shared, Shown, ViewKind},
     theme::{semibold, space, type_size},
     widgets::{card_ui, dim_ui, ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui},
 };
@@ -101,6 +101,9 @@ impl StudyView {
         effects: &mut Vec<Effect>,
     ) {
         look.page = look.page.min(report.pages.len() - 1);
+        if self.is_outdated() {
+            ui.multiply_opacity(0.6);
+        }
         let page = &report.pages[look.page];
         let whole = ui.available_rect_before_wrap();
         let (has_table, has_notes) = (!page.table.columns.is_empty(), !page.notes.is_empty());
@@ -145,7 +148,7 @@ impl StudyView {
             ui.set_min_height(space(7));
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if self.is_outdated() {
-                    dim_ui(ui, "The recording or the settings have changed since: begin again.");
+                    dim_ui(ui, "Result of the previous settings: run again.");
                 } else if self.study().is_none_or(|study| !study.outcome.parts().2.is_empty()) {
                     self.marked_ui(ui, *look, shared, effects);
                 }
@@ -185,7 +188,7 @@ impl StudyView {
         }
         if open.clicked() {
             effects.extend(study.outcome.open(look.page, item));
-            effects.push(Effect::ShowTraining);
+            effects.push(Effect::Show(ViewKind::Train));
         }
     }
 
