@@ -202,8 +202,6 @@ pub struct RunResult {
     pub defect: Option<String>,
     /// Number of epochs of the start that is furthest ahead.
     pub epochs_run: usize,
-    /// Number of starts that have ended.
-    pub starts_ended: usize,
     /// Wall-clock time of the training, with all starts in parallel, if known.
     pub wall_time: Option<Duration>,
     /// Decoding time of one snapshot, measured when the training pauses or ends.
