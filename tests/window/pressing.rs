@@ -125,10 +125,9 @@ fn the_whole_window_follows_the_finger() {
     driver.wait("the press", |driver| driver.says("Network, mean mm: "));
     assert_ne!(driver.get(READINGS).value(), before);
     let heights = driver.get(ACTUAL).value().unwrap();
-    assert!(
-        heights.starts_with("z 4.2") && heights.ends_with("to 5.00 mm"),
-        "{heights}"
-    );
+    let (low, high) = heights.trim_start_matches("z ").split_once(" to ").unwrap();
+    let [low, high]: [f64; 2] = [low, high.trim_end_matches(" mm")].map(|text| text.parse().unwrap());
+    assert!((low - 4.2).abs() < 0.1 && high > 4.98, "{heights}");
     let simulation = *small().simulation().unwrap();
     let geometry = &simulation.sensor.geometry;
     let place = geometry.row_node_mm(simulation.sensor.scale, row, node);
@@ -186,11 +185,10 @@ fn the_other_decoders_answer_alongside_the_network() {
     });
     assert!(!driver.says("Newton, "), "folded until asked for");
     driver.click("Other decoders");
-    driver.wait("Newton's answer", |driver| {
-        driver
-            .texts()
-            .iter()
-            .any(|text| text.starts_with("Newton, worst mm: ") && !text.ends_with('…'))
+    driver.wait("their answers", |driver| {
+        let answers = driver.texts().into_iter().filter(|text| text.contains(", worst mm: "));
+        let answers = Vec::from_iter(answers);
+        answers.len() > 6 && !answers.iter().any(|text| text.ends_with('…'))
     });
     let worst = |driver: &Driver, name: &str| -> f64 {
         let start = format!("{name}, worst mm: ");
@@ -269,25 +267,22 @@ fn the_right_button_and_shift_turn_and_keys_press_too() {
     let camera = |driver: &Driver| driver.state().look.camera;
     let drag = |driver: &mut Driver, button: PointerButton, modifiers: Modifiers| {
         let click = |driver: &mut Driver, pos: Pos2, pressed: bool| {
-            driver.harness().event_modifiers(
-                Event::PointerButton {
-                    pos,
-                    button,
-                    pressed,
-                    modifiers,
-                },
+            driver.harness().event(Event::PointerButton {
+                pos,
+                button,
+                pressed,
                 modifiers,
-            );
+            });
             driver.harness().step();
         };
+        driver.harness().event(Event::ModifiersChanged(modifiers));
         move_to(driver, middle);
         click(driver, middle, true);
         for across in [60.0, 80.0] {
-            let pos = middle + vec2(across, 10.0);
-            driver.harness().event_modifiers(Event::PointerMoved(pos), modifiers);
-            driver.harness().step();
+            move_to(driver, middle + vec2(across, 10.0));
         }
         click(driver, middle + vec2(80.0, 10.0), false);
+        driver.harness().event(Event::ModifiersChanged(Modifiers::NONE));
         driver.harness().run_steps(2);
     };
     let before = camera(&driver);
