@@ -16,6 +16,7 @@ pub enum Command {
     ResumeTraining,
     StopTraining,
     OpenFiles,
+    DecodeFile,
     PressMiddle,
     NextSample,
     PreviousSample,
@@ -81,6 +82,11 @@ impl Command {
             Self::ResumeTraining => ("Resume training", ctrl(Key::P), ""),
             Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
             Self::OpenFiles => ("Open files", None, "A recording, recipe, network or checkpoint."),
+            Self::DecodeFile => (
+                "Decode file",
+                None,
+                "All rows of another file, with the network, to CSV.",
+            ),
             Self::PressMiddle => ("Press the middle of the surface", None, "Touch the sensor."),
             Self::NextSample => ("Next test sample", plain(Key::PageDown), ""),
             Self::PreviousSample => ("Previous test sample", plain(Key::PageUp), ""),
@@ -146,6 +152,8 @@ pub struct Offer {
     pub command: Command,
     /// False if it is not available now.
     pub is_possible: bool,
+    /// The view that must be shown first, if it is another one.
+    pub of: Option<ViewKind>,
 }
 
 /// The commands of this frame. The caller that offers a command carries it out when [`Self::offer`] returns true: its keys were
@@ -181,7 +189,12 @@ impl<'a> Offers<'a> {
         };
         let keys = command.about().keys.filter(may_hear);
         let is_pressed = keys.is_some_and(|keys| self.ctx.input_mut(|input| input.consume_shortcut(&keys)));
-        self.list.push(Offer { command, is_possible });
+        let of = None;
+        self.list.push(Offer {
+            command,
+            is_possible,
+            of,
+        });
         is_possible && (is_picked || is_pressed)
     }
 

@@ -16,7 +16,7 @@ use eframe::egui::{Align, Label, Layout, Rect, RichText, Sense, Slider, Ui, Widg
 use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
     plotting::{cells_ui, titled_plots_ui},
-    shared::{Command, Effect, Look, Shared, surface_cards_ui, surface_ui, view_mode_ui},
+    shared::{Command, Effect, Look, Shared, ViewKind, surface_cards_ui, surface_ui, view_mode_ui},
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
@@ -179,7 +179,7 @@ fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mu
         ui.add_space(space(4));
         if button.is_some_and(|button| ui.add(primary_button(button)).clicked()) {
             match button {
-                Some(TRAIN) => effects.extend([Effect::ShowTraining, Effect::Train]),
+                Some(TRAIN) => effects.extend([Effect::Show(ViewKind::Train), Effect::Train]),
                 _ => view.start(shared, effects),
             }
         }
