@@ -84,7 +84,7 @@ fn presets_set_the_array_and_its_surface_follows() {
         assert_eq!(driver.state().draft.simulation().unwrap().sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
-            let drawn = driver.views().train.drawn.surfaces.as_ref();
+            let drawn = driver.views().train.drawing();
             drawn.is_some_and(|drawn| drawn.actual.nodes.len() == scale.rows() * scale.nodes_per_row())
         });
     }
@@ -217,15 +217,13 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
     driver.wait("the new surface", |driver| {
         driver
             .state()
-            .test()
-            .is_some_and(|test| test.sensor == driver.state().draft.simulation().unwrap().sensor)
+            .skin()
+            .is_some_and(|skin| skin.sensor == driver.state().draft.simulation().unwrap().sensor)
     });
     let x_mm: Vec<f64> = driver
         .views()
         .train
-        .drawn
-        .surfaces
-        .as_ref()
+        .drawing()
         .unwrap()
         .actual
         .nodes

@@ -19,12 +19,12 @@ use crate::{
 };
 
 const SAVE: &str = "Checkpoint, resumable";
-const OPEN: &str = "Open checkpoint…";
+const OPEN: &str = "Open files";
 
-/// Types `path` into the form behind `button` and confirms.
+/// Types `path` into the form of an action and confirms.
 fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
     if button == OPEN {
-        driver.open_form(button);
+        driver.act(button);
     } else {
         driver.export(button);
     }

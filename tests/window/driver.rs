@@ -32,14 +32,13 @@ use crate::rasterise::Rasteriser;
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Parts of the configuration that are folded away at first.
-const FOLDED: [&str; 7] = [
+const FOLDED: [&str; 6] = [
     "Scene",
     "Samples",
     "Geometry",
     "Network inputs",
     "When to stop",
     "Method settings",
-    "Figures of the paper",
 ];
 
 /// Label of the button that closes a notice.
@@ -541,8 +540,8 @@ impl Driver {
         self.wait("the small array's surface", |driver| {
             driver
                 .state()
-                .test()
-                .is_some_and(|test| test.sensor == wanted.simulation().unwrap().sensor)
+                .skin()
+                .is_some_and(|skin| skin.sensor == wanted.simulation().unwrap().sensor)
         });
     }
 

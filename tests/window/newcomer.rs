@@ -43,16 +43,7 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     shows_the_baselines_of(&driver, opened);
     assert!(!driver.has("Published"), "the paper has no print");
     // A print: most of the surface is at rest, and the middle of it is pressed.
-    let depths_mm = driver
-        .views()
-        .train
-        .drawn
-        .surfaces
-        .as_ref()
-        .unwrap()
-        .actual
-        .nodes
-        .iter();
+    let depths_mm = driver.views().train.drawing().unwrap().actual.nodes.iter();
     let depths_mm: Vec<f64> = depths_mm.map(|node| 5.0 - node.z).collect();
     let at_rest = depths_mm.iter().filter(|depth_mm| **depth_mm < 0.01).count();
     let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
@@ -73,8 +64,8 @@ fn only_the_papers_own_network_is_announced_to_take_seconds() {
     assert!(driver.says(SAYS));
     driver.enter("Array scale", "2x2_1x6");
     driver.wait("the small array", |driver| {
-        let test = driver.state().test();
-        test.is_some_and(|test| test.sensor.scale.rows() == 2)
+        let skin = driver.state().skin();
+        skin.is_some_and(|skin| skin.sensor.scale.rows() == 2)
     });
     driver.settle();
     assert!(driver.says("Press Train to fill in") && !driver.says(SAYS));
@@ -202,7 +193,7 @@ fn empty_views_fill_on_a_click() {
     assert!(driver.is_enabled("Measure now"));
     driver.click_button("Train");
     driver.settle();
-    driver.click_button("Train now");
+    driver.click("▶ Train");
     driver.wait("the end of the training", |driver| {
         matches!(driver.state().phase, Phase::Ended(_))
     });

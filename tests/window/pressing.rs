@@ -8,7 +8,7 @@ use decoupler_core::{
     scene::{Indenter, IndenterShape, Radii},
 };
 use decoupler_files::export::format_number;
-use eframe::egui::{Event, Key, Modifiers, MouseWheelUnit, Pos2, Rect, TouchPhase, vec2};
+use eframe::egui::{Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, vec2};
 use egui_kittest::kittest::NodeT as _;
 
 use crate::driver::{Driver, small, trained};
@@ -213,7 +213,7 @@ fn a_newcomer_presses_before_any_training_and_a_demo_network_answers() {
     let mut driver = Driver::open();
     driver.configure_small();
     assert!(driver.says("Press the surface on the left"));
-    driver.click_button("Press it");
+    driver.act("Press the middle of the surface");
     driver.wait("the demo network's answer", |driver| driver.says("Network, mean mm: "));
     assert!(driver.has(DECODED) && driver.has(DEMO));
     let rest_mm = 0.8 * 0.5;
@@ -255,33 +255,52 @@ fn the_demo_network_is_useful_on_every_array_of_the_paper() {
 }
 
 #[test]
-fn turning_is_one_click_away_and_keys_press_too() {
+fn the_right_button_and_shift_turn_and_keys_press_too() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
     driver.wait_for_last_epoch();
     let middle = driver.get(ACTUAL).rect().center();
     let camera = |driver: &Driver| driver.state().look.camera;
-    let before = camera(&driver);
-    let drag = |driver: &mut Driver| {
+    let drag = |driver: &mut Driver, button: PointerButton, modifiers: Modifiers| {
+        let click = |driver: &mut Driver, pos: Pos2, pressed: bool| {
+            driver.harness().event_modifiers(
+                Event::PointerButton {
+                    pos,
+                    button,
+                    pressed,
+                    modifiers,
+                },
+                modifiers,
+            );
+            driver.harness().step();
+        };
         move_to(driver, middle);
-        push(driver, middle);
-        move_to(driver, middle + vec2(60.0, 10.0));
-        move_to(driver, middle + vec2(80.0, 10.0));
-        driver.harness().drop_at(middle);
+        click(driver, middle, true);
+        for across in [60.0, 80.0] {
+            let pos = middle + vec2(across, 10.0);
+            driver.harness().event_modifiers(Event::PointerMoved(pos), modifiers);
+            driver.harness().step();
+        }
+        click(driver, middle + vec2(80.0, 10.0), false);
         driver.harness().run_steps(2);
     };
-    drag(&mut driver);
+    let before = camera(&driver);
+    drag(&mut driver, PointerButton::Primary, Modifiers::NONE);
     driver.wait("the press", |driver| driver.has(BACK));
     assert_eq!(camera(&driver), before, "pressing turns nothing");
     driver.press(Key::Escape);
 
-    driver.click_button("Turn");
-    drag(&mut driver);
-    assert!(!driver.has(BACK));
-    assert_ne!(camera(&driver), before);
+    for (button, modifiers) in [
+        (PointerButton::Secondary, Modifiers::NONE),
+        (PointerButton::Primary, Modifiers::SHIFT),
+    ] {
+        let before = camera(&driver);
+        drag(&mut driver, button, modifiers);
+        assert!(!driver.has(BACK), "turning presses nothing");
+        assert_ne!(camera(&driver), before, "{button:?} with {modifiers:?}");
+    }
 
-    driver.click_button("Press");
     driver.get(ACTUAL).focus();
     driver.harness().run_steps(2);
     let turned = camera(&driver);
@@ -291,5 +310,5 @@ fn turning_is_one_click_away_and_keys_press_too() {
     // From the middle by half a row pitch.
     let place_mm = middle_mm() + DVec2::new(0.5, 0.0);
     wait_for_press(&mut driver, &trained(small()), place_mm, 0.75);
-    assert_eq!(camera(&driver), turned, "the keys press now");
+    assert_eq!(camera(&driver), turned, "the keys press");
 }

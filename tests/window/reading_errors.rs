@@ -77,7 +77,7 @@ fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
     driver.click("Nodes");
     driver.settle();
     let plot = plot_place(&mut driver, "z (mm) against node");
-    let drawn = driver.views().train.drawn.surfaces.as_ref().unwrap();
+    let drawn = driver.views().train.drawing().unwrap();
     let (nodes, count) = (drawn.actual.nodes.len(), 60);
     assert_eq!(nodes, count, "10 × 6");
     // Across the plot at all heights: the path crosses some points, and gaps between them.

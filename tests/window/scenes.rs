@@ -57,10 +57,7 @@ fn with_one_row_only_that_row_is_drawn() {
     assert_eq!(driver.state().draft.simulation().unwrap().scene.rows, Rows::One(3));
     assert!(driver.has("6 unknowns, 18 equations per frame"));
     wait_for_scene(&mut driver);
-    assert_eq!(
-        driver.views().train.drawn.surfaces.as_ref().unwrap().actual.nodes.len(),
-        6
-    );
+    assert_eq!(driver.views().train.drawing().unwrap().actual.nodes.len(), 6);
     assert!(driver.says("1 of 100"), "a snapshot is one sample");
     driver.train();
     let mut settings = small();

@@ -76,7 +76,8 @@ fn a_notice_above_a_field_does_not_interrupt_typing() {
         );
         preview.is_some_and(|preview| {
             let source = preview.settings.simulation().unwrap();
-            (source.sensor, source.scene) == (draft.sensor, draft.scene) && preview.test.outlook.is_some()
+            (source.sensor, source.scene) == (draft.sensor, draft.scene)
+                && preview.test.skin.as_ref().unwrap().outlook.is_some()
         })
     });
     driver.press(Key::Enter);

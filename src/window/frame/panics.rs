@@ -109,8 +109,8 @@ fn a_press_on_a_large_array_is_answered_again_after_a_panic() {
     (simulation.samples, simulation.test_samples) = (2, 1);
     driver.window_mut().apply(Effect::Configure(Box::new(settings)));
     driver.wait("the surface", |driver| {
-        let test = driver.state().test();
-        test.is_some_and(|test| test.sensor == settings.simulation().unwrap().sensor)
+        let skin = driver.state().skin();
+        skin.is_some_and(|skin| skin.sensor == settings.simulation().unwrap().sensor)
     });
     panics(&mut driver, "press", |driver| {
         driver.act("Press the middle of the surface");

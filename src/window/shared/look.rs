@@ -5,7 +5,7 @@ use decoupler_files::{
     export::format_number,
     figure::{
         SequentialMap,
-        surface::{OrbitCamera, Quantity, Surface, ViewMode},
+        surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
     },
 };
 use eframe::egui::{
@@ -14,10 +14,10 @@ use eframe::egui::{
 
 use super::Effect;
 use crate::window::{
-    surface_view::{ColourBar, SurfaceViewResponse},
+    surface_view::{SurfaceView, SurfaceViewResponse, colour_bar_ui},
     test_view::HeightScale,
-    theme::{Theme, rgb, space},
-    widgets::{dim_ui, section_heading_ui, segmented_ui},
+    theme::{rgb, space},
+    widgets::{card_ui, dim_ui, section_heading_ui, segmented_ui},
 };
 
 /// Camera, mode and colours in which all views draw surfaces.
@@ -82,8 +82,42 @@ pub fn view_mode_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
     effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
 }
 
-/// Turns all surfaces as this one was turned, and marks the node under the pointer on its neighbours too.
-pub fn follow_surface(shown: &SurfaceViewResponse, look: Look, marked: &mut Option<usize>, effects: &mut Vec<Effect>) {
+/// Cards of the same width side by side in `rect`, with the colour scales of `figure` at the right of the last one;
+/// `contents_ui` receives the number of the card.
+pub fn surface_cards_ui(
+    ui: &mut Ui,
+    (rect, cards): (Rect, usize),
+    figure: &SurfaceFigure,
+    look: Look,
+    effects: &mut Vec<Effect>,
+    mut contents_ui: impl FnMut(&mut Ui, usize, &mut Vec<Effect>),
+) {
+    let gap = space(2);
+    let (whole, scales) = rect.split_left_right_at_x(rect.right() - Surface::SCALE_WIDTH);
+    let width = (whole.width() - gap * (cards as f32 - 1.0)) / cards as f32;
+    for place in 0..cards {
+        let left = whole.left() + (width + gap) * place as f32;
+        let card = Rect::from_x_y_ranges(left..=left + width, whole.y_range());
+        card_ui(ui, card, |ui| contents_ui(ui, place, effects));
+    }
+    let (parts, note) = (figure.scales(), figure.note());
+    let part = scales.height() / parts.len().max(1) as f32;
+    for (index, scale) in parts.iter().enumerate() {
+        let top = scales.top() + part * index as f32;
+        let slot = Rect::from_x_y_ranges(scales.x_range(), top..=top + part).shrink2(vec2(0.0, space(4)));
+        colour_scale_ui(ui, slot, scale, &note, look, effects);
+    }
+}
+
+/// Shows a surface, turns all surfaces as it is turned, and marks the node under the pointer on its neighbours too.
+pub fn surface_ui(
+    ui: &mut Ui,
+    view: SurfaceView<'_>,
+    look: Look,
+    marked: &mut Option<usize>,
+    effects: &mut Vec<Effect>,
+) -> SurfaceViewResponse {
+    let shown = view.show(ui);
     if shown.camera != look.camera {
         let camera = shown.camera;
         effects.push(Effect::Look(Look { camera, ..look }));
@@ -93,6 +127,7 @@ pub fn follow_surface(shown: &SurfaceViewResponse, look: Look, marked: &mut Opti
         *marked = shown.hovered_node;
         shown.response.ctx.request_repaint();
     }
+    shown
 }
 
 /// The list of targets behind `name`, where there are several.
@@ -115,10 +150,9 @@ pub fn target_choice_ui(ui: &mut Ui, name: &str, id: &str, targets: &[Channel], 
 
 /// The colour scale in `slot`. A click opens its options: the colour map, and whether the scale is locked. `note` is shown
 /// under the pointer.
-pub fn colour_scale_ui(ui: &mut Ui, slot: Rect, scale: &Surface, note: &str, look: Look, effects: &mut Vec<Effect>) {
+fn colour_scale_ui(ui: &mut Ui, slot: Rect, scale: &Surface, note: &str, look: Look, effects: &mut Vec<Effect>) {
     let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
-    let theme = Theme::of(ui);
-    let bar = ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
+    let bar = colour_bar_ui(&mut slot_ui, scale, slot.height());
     let mut changed = look;
     Popup::menu(&bar).show(|ui| {
         // A menu justifies its lines.

@@ -16,7 +16,7 @@ use decoupler_files::{
 use serde::{Deserialize, Serialize};
 
 use super::{Look, RunList, RunResult, RunView, ViewKind};
-use crate::window::test_view::{HeightScale, RecordedTest, TestView};
+use crate::window::test_view::{HeightScale, Skin, TestView};
 
 /// State that all views read.
 #[derive(Debug)]
@@ -209,17 +209,17 @@ impl Shared {
         }
     }
 
-    /// Returns the nodes of the current test set: the training's, or the draft's if it has another one; none for a recording.
+    /// Returns the current test set: the training's, or the draft's if it has another one.
     pub fn test(&self) -> Option<&TestView> {
         match &self.preview {
             Some(preview) if self.source == SourceKind::Array => Some(&preview.test),
-            _ => self.shown_run().and_then(|run| run.test.array()),
+            _ => self.shown_run().map(|run| &run.test),
         }
     }
 
-    /// Returns the displayed test samples of a recording.
-    pub fn recorded_test(&self) -> Option<&RecordedTest> {
-        self.shown_run().and_then(|run| run.test.recording())
+    /// Returns the array of the current test set; none for a recording.
+    pub fn skin(&self) -> Option<&Arc<Skin>> {
+        self.test()?.skin.as_ref()
     }
 
     /// Returns the current training; none if it has the other source, or the draft has another test set by now.

@@ -27,7 +27,7 @@ use super::{
 };
 use crate::window::{
     job::{Background, JobError, Wake},
-    test_view::TargetCharts,
+    test_view::TestCharts,
 };
 
 /// Request from the window to the worker.
@@ -170,8 +170,8 @@ pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
 pub struct RunResult {
     /// Decoded values of the test set: samples × targets, in their units.
     pub answers: Arc<Array2<f64>>,
-    /// Charts of all test samples of a recording.
-    pub charts: Option<Arc<TargetCharts>>,
+    /// Charts of all test samples.
+    pub charts: Arc<TestCharts>,
     /// Remarks on the errors of a recording, when the training is paused or has ended.
     pub remarks: Vec<String>,
     /// Errors of the decoded values.

@@ -15,7 +15,7 @@ use super::{
     message::{Progress, RunId, RunResult, append_epochs},
     past_networks::PastNetworks,
 };
-use crate::window::test_view::{TestSet, TestViewError};
+use crate::window::test_view::{TestView, TestViewError};
 
 /// A training as known to the window.
 #[derive(Debug)]
@@ -34,7 +34,7 @@ pub struct RunView {
     /// Weights and biases of the network.
     pub weights: usize,
     /// Its test set.
-    pub test: TestSet,
+    pub test: TestView,
     /// Errors of the baselines.
     pub baselines: Baselines,
     /// Errors that the paper reports for this configuration.
@@ -84,7 +84,7 @@ impl RunView {
             search: recorded.and_then(|recorded| recorded.search.clone()),
             problem: Arc::clone(run.problem()),
             weights: run.leader().weights(),
-            test: TestSet::of(run, order)?,
+            test: TestView::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)?,
             baselines: baselines.expect("the baselines of a whole run are measured"),
             history: Vec::new(),
             outline: EpochOutline::default(),

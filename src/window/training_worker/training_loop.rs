@@ -38,7 +38,7 @@ use super::{
 };
 use crate::window::{
     job::Report,
-    test_view::{TestSet, TestViewError},
+    test_view::{TestView, TestViewError},
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
@@ -60,7 +60,7 @@ struct Training {
     id: RunId,
     trained: TrainedRun,
     /// Its test set, ready to be drawn.
-    test: TestSet,
+    test: TestView,
     past: PastNetworks,
     stage: Stage,
     /// Reason why the training that has ended has no intervals.
@@ -376,7 +376,7 @@ impl Training {
         let answers = run.decouple_test();
         let errors = run.errors_of(&answers);
         let network_alone = run.scores().and_then(|scores| scores.network_alone);
-        let charts = self.test.recording().map(|test| Arc::new(test.charts(&answers)));
+        let charts = Arc::new(self.test.charts(&answers));
         let has_several = run.trainers().len() > 1;
         let starts = if has_several { run.starts() } else { Vec::new() };
         let cost = begun.elapsed();

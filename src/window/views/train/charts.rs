@@ -2,9 +2,8 @@
 //! offers a list of them, and one card draws the chosen one.
 
 use decoupler_files::figure::{
-    Decoded, Figure, HeatMap, Ink, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
-    hysteresis_figure, loss_figure, node_figure, pair_address, pair_sample, regression_figure, sample_figure,
-    training_state_figure,
+    Decoded, Figure, HeatMap, Ink, LineAt, LineStyle, Series, histogram_figure, hysteresis_figure, loss_figure,
+    node_figure, pair_address, pair_sample, regression_figure, sample_figure, training_state_figure, value_pairs,
 };
 use eframe::egui::{Ui, UiBuilder};
 
@@ -16,10 +15,9 @@ use super::{
 };
 use crate::window::{
     plotting::{Pointer, cells_ui, plots_ui},
-    shared::{Command, Effect, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
-    test_view::{Positions, TargetCharts},
+    shared::{Command, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
     theme::{Theme, space},
-    widgets::{invitation_ui, tabs_ui},
+    widgets::{placeholder_ui, tabs_ui},
 };
 
 /// A chart of the displayed result.
@@ -64,8 +62,11 @@ const LOSS: Chart = Chart {
     draw: |view, shared| {
         let (run, result) = trained(view, shared)?;
         let mut figure = loss_figure(run.outline.records(), &run.stages, result.best_epoch);
-        let past = view.scrub.epoch().map(|epoch| LineAt::X(epoch as f64));
-        add_line(&mut figure, "displayed network", past);
+        if let (Some(epoch), Some(plot)) = (view.scrub.epoch(), figure.plots.first_mut()) {
+            let at = LineAt::X(epoch as f64);
+            let line = Series::across("displayed network", at, Ink::Violet, LineStyle::Solid);
+            plot.series.push(line);
+        }
         Some(figure.into())
     },
     ..BARE
@@ -85,14 +86,8 @@ const HISTOGRAM: Chart = Chart {
     name: "Histogram",
     hint: "The distribution of the z errors in the test set appears here.",
     draw: |view, shared| {
-        let mut figure = histogram_figure(view.drawn.pairs()?, None, decoded(view, shared)?);
-        let name = match shared.recorded_test() {
-            None => "node under the pointer",
-            Some(_) => "displayed sample",
-        };
-        let lit = lit_value(view, shared).map(|[actual, decoded]| LineAt::X(decoded - actual));
-        add_line(&mut figure, name, lit);
-        Some(figure.into())
+        let (pairs, of) = pairs(view, shared)?;
+        Some(histogram_figure(&pairs, None, of).into())
     },
     bar_ui: target_bar_ui,
     ..BARE
@@ -102,12 +97,10 @@ const REGRESSION: Chart = Chart {
     name: "Regression",
     hint: "Decoded against actual z of every node in the test set appears here.",
     draw: |view, shared| {
-        let pairs = view.drawn.pairs()?;
-        let line = match shared.recorded_test() {
-            None => RegressionLine::of(pairs.iter().copied()),
-            Some(test) => *target_charts(view, shared)?.lines.get(view.target_of(test))?,
-        };
-        let figure = regression_figure((pairs.len(), &|pair| pairs[pair]), &line, decoded(view, shared)?);
+        let (pairs, of) = pairs(view, shared)?;
+        let line = view.target_of(shared.test()?).unwrap_or(0);
+        let line = view.result(shared)?.charts.lines.get(line)?;
+        let figure = regression_figure((pairs.len(), &|pair| pairs[pair]), line, of);
         Some(figure.lighting(|_| false, lit_value(view, shared).as_slice()).into())
     },
     items: Items::Values,
@@ -119,13 +112,13 @@ const HYSTERESIS: Chart = Chart {
     name: "Hysteresis",
     hint: "Mean decoded against actual values appear here, loading and unloading apart, for a target that rises and falls.",
     is_offered: |shared| {
-        let charts = shared.result().and_then(|result| result.charts.as_ref());
-        charts.is_some_and(|charts| charts.loops.iter().any(Option::is_some))
+        let result = shared.result();
+        result.is_some_and(|result| result.charts.loops.iter().any(Option::is_some))
     },
     draw: |view, shared| {
-        let test = shared.recorded_test()?;
-        let target = view.target_of(test);
-        let found = target_charts(view, shared)?.loops.get(target)?.as_ref()?;
+        let test = shared.test()?;
+        let target = view.target_of(test)?;
+        let found = view.result(shared)?.charts.loops.get(target)?.as_ref()?;
         Some(hysteresis_figure(found, test.problem.targets.get(target)?).into())
     },
     bar_ui: target_bar_ui,
@@ -135,15 +128,24 @@ const HYSTERESIS: Chart = Chart {
 /// All targets of the sample, actual and decoded. Without surfaces it takes their place.
 pub(super) const SAMPLE: Chart = Chart {
     name: "Sample",
-    is_offered: has_target_surface,
+    is_offered: |shared| shared.test().is_some_and(|test| test.through().is_some()),
     draw: |view, shared| {
-        let (test, result) = (shared.recorded_test()?, view.result(shared)?);
+        let (test, result) = (shared.test().filter(|test| test.skin.is_none())?, view.result(shared)?);
         let values = |values: ndarray::ArrayView2<'_, f64>| {
             let is_there = view.snapshot < values.nrows();
             is_there.then(|| values.row(view.snapshot).to_vec())
         };
         let [actual, decoded] = [values(test.set.targets())?, values(result.answers.view())?];
-        Some(sample_figure(&test.problem.targets, &actual, &decoded, &test.ranges).into())
+        let targets = test.set.targets();
+        let range = |values: ndarray::ArrayView1<'_, f64>| {
+            values
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
+                    (low.min(value), high.max(value))
+                })
+        };
+        let ranges = Vec::from_iter(targets.columns().into_iter().map(range));
+        Some(sample_figure(&test.problem.targets, &actual, &decoded, &ranges).into())
     },
     items: Items::Nodes,
     ..BARE
@@ -151,12 +153,9 @@ pub(super) const SAMPLE: Chart = Chart {
 
 const ERROR_MAP: Chart = Chart {
     name: "Error map",
-    is_offered: |shared| {
-        let charts = shared.result().and_then(|result| result.charts.as_ref());
-        charts.is_some_and(|charts| charts.error_map.is_some())
-    },
+    is_offered: |shared| shared.result().is_some_and(|result| result.charts.error_map.is_some()),
     draw: |view, shared| {
-        let map = target_charts(view, shared)?.error_map.as_ref()?;
+        let map = view.result(shared)?.charts.error_map.as_ref()?;
         Some(HeatMap::clone(map).coloured(shared.look.colours).into())
     },
     ..BARE
@@ -166,10 +165,11 @@ const ERROR_MAP: Chart = Chart {
 pub(super) const NODES: Chart = Chart {
     name: "Nodes",
     draw: |view, shared| {
-        let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
+        let nodes_per_row = shared.skin()?.sensor.scale.nodes_per_row();
         let drawing = view.drawing()?;
         let decoded_mm = drawing.decoded.as_ref().map(|[decoded, _]| &*decoded.nodes);
-        let bars_mm = view.has_error_bars.then(|| view.drawn.spread_mm()).flatten();
+        let bars_mm = view.result(shared).filter(|_| view.has_error_bars);
+        let bars_mm = bars_mm.map(|result| &*result.charts.spread_mm);
         Some(node_figure(&drawing.actual.nodes, decoded_mm, bars_mm, nodes_per_row).into())
     },
     items: Items::Nodes,
@@ -184,11 +184,11 @@ pub(super) const NODES: Chart = Chart {
 
 pub(super) const SECTION: Chart = Chart {
     name: "Section",
-    draw: |view, shared| Some(section_of(&view.section, shared.test()?, view.drawing()?, shared.look).into()),
+    draw: |view, shared| Some(section_of(&view.section, shared.skin()?, view.drawing()?, shared.look).into()),
     items: Items::Nodes,
     bar_ui: |ui, view, shared| {
-        if let Some(test) = shared.test() {
-            section_bar_ui(ui, &mut view.section, test);
+        if let Some(skin) = shared.skin() {
+            section_bar_ui(ui, &mut view.section, skin);
         }
     },
     ..BARE
@@ -288,40 +288,33 @@ fn trained<'a>(view: &'a TrainView, shared: &'a Shared) -> Option<(&'a RunView, 
     shared.shown_run().zip(view.result(shared))
 }
 
-fn target_charts<'a>(view: &'a TrainView, shared: &'a Shared) -> Option<&'a TargetCharts> {
-    view.result(shared)?.charts.as_deref()
-}
-
-/// What the values of the test set are: z of the nodes, or those of the displayed target.
-fn decoded<'a>(view: &TrainView, shared: &'a Shared) -> Option<Decoded<'a>> {
-    match shared.recorded_test() {
-        None => Some(Decoded::Nodes),
-        Some(test) => Some(Decoded::Target(test.problem.targets.get(view.target_of(test))?)),
-    }
-}
-
-fn add_line(figure: &mut PlotFigure, name: &str, at: Option<LineAt>) {
-    if let (Some(at), Some(plot)) = (at, figure.plots.first_mut()) {
-        plot.series
-            .push(Series::across(name, at, Ink::Orange, LineStyle::Solid));
-    }
+/// Returns actual and decoded values of the test set, and what they are: z of the nodes, or those of the displayed target.
+fn pairs<'a>(view: &TrainView, shared: &'a Shared) -> Option<(Vec<(f64, f64)>, Decoded<'a>)> {
+    let (test, result) = (shared.test()?, view.result(shared)?);
+    let target = view.target_of(test);
+    let of = match target {
+        None => Decoded::Nodes,
+        Some(target) => Decoded::Target(test.problem.targets.get(target)?),
+    };
+    Some((value_pairs(&test.set, &result.answers, target), of))
 }
 
 /// Returns the snapshot and the node of one of the values of the test set; for a recording the sample and the target.
 fn place_of_value(view: &TrainView, shared: &Shared, value: usize) -> Option<(usize, Option<usize>)> {
-    if let Some(test) = shared.test() {
+    let test = shared.test()?;
+    if let Some(skin) = &test.skin {
         let address = pair_address(&test.set, value)?;
-        return Some((address.snapshot, test.node(address)));
+        return Some((address.snapshot, skin.node(address)));
     }
-    let test = shared.recorded_test()?;
-    Some((pair_sample(&test.set, value)?, Some(view.target_of(test))))
+    Some((pair_sample(&test.set, value)?, view.target_of(test)))
 }
 
 /// Returns the actual and decoded value that are highlighted among those of the test set: those of the lit node, or for a
 /// recording those of the displayed target and sample.
 fn lit_value(view: &TrainView, shared: &Shared) -> Option<[f64; 2]> {
-    if let Some(test) = shared.recorded_test() {
-        let at = [view.snapshot, view.target_of(test)];
+    let test = shared.test()?;
+    if let Some(target) = view.target_of(test) {
+        let at = [view.snapshot, target];
         let answers = &view.result(shared)?.answers;
         return Some([*test.set.targets().get(at)?, *answers.get(at)?]);
     }
@@ -332,20 +325,17 @@ fn lit_value(view: &TrainView, shared: &Shared) -> Option<[f64; 2]> {
 
 /// Returns the nodes of the row-wire that is pointed at, which are lit together.
 pub(super) fn lit_nodes(view: &TrainView, shared: &Shared) -> Vec<usize> {
-    let per_row = shared.test().map_or(0, |test| test.sensor.scale.nodes_per_row());
+    let per_row = shared.skin().map_or(0, |skin| skin.sensor.scale.nodes_per_row());
     let row = view.lights.row.into_iter();
     row.flat_map(|row| row * per_row..(row + 1) * per_row).collect()
 }
 
-/// Returns true if a surface goes through the displayed targets of the recording.
-pub(super) fn has_target_surface(shared: &Shared) -> bool {
-    let test = shared.recorded_test();
-    test.is_some_and(|test| matches!(test.positions, Positions::Surface(_)))
-}
-
 /// The choice of the target, where there are several.
 fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
-    if let Some(test) = shared.recorded_test().filter(|_| shared.result().is_some()) {
+    if let Some(test) = shared
+        .test()
+        .filter(|test| test.skin.is_none() && shared.result().is_some())
+    {
         let targets = &test.problem.targets;
         target_choice_ui(ui, "Target", "target of the charts", targets, &mut view.target);
     }
@@ -353,13 +343,7 @@ fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
 
 /// The charts below the surfaces, including the readings unless they have their own card, and the bar that goes through
 /// past epochs.
-pub fn charts_card_ui(
-    ui: &mut Ui,
-    view: &mut TrainView,
-    shared: &Shared,
-    has_readings: bool,
-    effects: &mut Vec<Effect>,
-) {
+pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_readings: bool) {
     /// Width of a card below which the longest name of a tab is cut.
     const NARROW: f32 = space(106);
     let is_narrow = ui.available_width() < NARROW;
@@ -382,13 +366,12 @@ pub fn charts_card_ui(
         place.max.y -= scrub::HEIGHT;
     }
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
-        let is_possible = !shared.phase.is_busy();
         if chart.name == READINGS.name {
             readings_of_view_ui(ui, view, shared);
         } else if let Some(figure) = chart.figure(view, shared) {
             chart.figure_ui(ui, &figure, view, shared);
-        } else if invitation_ui(ui, chart.hint, "Train now", is_possible) {
-            effects.push(Effect::Train);
+        } else {
+            placeholder_ui(ui, chart.hint);
         }
     });
     if let Some(past) = past {
@@ -399,9 +382,15 @@ pub fn charts_card_ui(
 /// Readings of the displayed surface. The one under the pointer lights up its nodes; a click cuts the surfaces along its
 /// wires.
 pub fn readings_of_view_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
-    let per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
+    let per_row = shared.skin().map_or(1, |skin| skin.sensor.scale.nodes_per_row());
     let row = view.lights.row.or(view.lights.node.map(|node| node / per_row));
-    let pointed = readings_ui(ui, view.drops_percent(), shared.test(), row, shared.look.colours);
+    let pointed = readings_ui(
+        ui,
+        view.drops_percent(),
+        shared.skin().map(|skin| &**skin),
+        row,
+        shared.look.colours,
+    );
     view.lights.row = pointed.as_ref().map(|pointed| pointed.cell[0]);
     if let Some(pointed) = pointed.filter(|pointed| pointed.is_clicked) {
         view.section.choose(pointed.cell);
@@ -418,11 +407,11 @@ impl TrainView {
                 self.tab = chart.name;
             }
         }
-        let Some(test) = shared.test().filter(|_| self.tab == SECTION.name) else {
+        let Some(skin) = shared.skin().filter(|_| self.tab == SECTION.name) else {
             return;
         };
         for (by, command) in [(-1, Command::PreviousSection), (1, Command::NextSection)] {
-            let stepped = self.section.stepped(by, test);
+            let stepped = self.section.stepped(by, skin);
             if offers.offer(command, stepped.is_some()) {
                 self.section = stepped.unwrap_or(self.section);
             }

@@ -8,30 +8,22 @@ use decoupler_core::{
 };
 use eframe::egui::{Button, Ui};
 
-use super::{
-    exports::{PAPER_FIGURES, PaperFigure},
-    recording::RecordingEditor,
-};
+use super::recording::RecordingEditor;
 use crate::window::{
     forms::{self, Fields, SetBy},
     glossary,
     shared::{Effect, Phase, Shared, SourceKind},
     theme::space,
-    widgets::{dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui, segmented_ui},
+    widgets::{dim_ui, fields::capitalised, fold_ui, note_ui, scrolled_ui, segmented_ui},
 };
 
-/// The source and the settings of the next training. Returns the figure of the paper that the user picked, if any.
-pub fn configuration_ui(
-    ui: &mut Ui,
-    recording: &mut RecordingEditor,
-    shared: &Shared,
-    effects: &mut Vec<Effect>,
-) -> Option<PaperFigure> {
+/// The source and the settings of the next training.
+pub fn configuration_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, effects: &mut Vec<Effect>) {
     let before = match shared.source {
         SourceKind::Array => shared.draft,
         SourceKind::Recording => shared.recording.settings,
     };
-    let (mut settings, mut picked) = (before, None);
+    let mut settings = before;
     scrolled_ui(ui, "configuration", |ui| {
         ui.add_space(space(2));
         let sources = [
@@ -47,7 +39,7 @@ pub fn configuration_ui(
         if shared.source == SourceKind::Recording && shared.recording.is_automatic() {
             fields.set_by = SetBy::Choice(shared.chosen_run().map(|run| run.settings()));
         }
-        picked = settings_ui(ui, &mut fields, recording, shared, effects);
+        settings_ui(ui, &mut fields, recording, shared, effects);
         reset_ui(ui, &mut settings, shared);
         ui.add_space(space(4));
     });
@@ -58,17 +50,16 @@ pub fn configuration_ui(
             SourceKind::Recording => Effect::ConfigureRecording(Box::new(settings)),
         });
     }
-    picked
 }
 
-/// The settings of either source. Returns the paper's figure that the user picked.
+/// The settings of either source.
 fn settings_ui(
     ui: &mut Ui,
     fields: &mut Fields<'_>,
     recording: &mut RecordingEditor,
     shared: &Shared,
     effects: &mut Vec<Effect>,
-) -> Option<PaperFigure> {
+) {
     let (is_recording, phase) = (shared.source == SourceKind::Recording, shared.phase);
     let (is_new, is_open) = (!phase.is_busy(), !phase.is_busy() || phase == Phase::Paused);
     ui.add_enabled_ui(is_new, |ui| match fields.settings.simulation_mut() {
@@ -102,20 +93,13 @@ fn settings_ui(
             ui.separator();
             recording.folds_ui(ui, fields.settings, shared, effects);
         } else {
-            array_ui(ui, fields, shared.test().and_then(|test| test.outlook.as_ref()));
+            array_ui(ui, fields, shared.skin().and_then(|skin| skin.outlook.as_ref()));
         }
         fold_ui(ui, "Network inputs", &fields.summary(forms::of_inputs), |ui| {
             forms::inputs_ui(ui, fields, is_recording && recording.has_row_wires(), size);
         });
     });
     ui.add_enabled_ui(is_open, |ui| forms::training_ui(ui, fields, is_new));
-    let mut picked = None;
-    if !is_recording {
-        ui.add_enabled_ui(is_new, |ui| {
-            fold_ui(ui, "Figures of the paper", "", |ui| picked = paper_figures_ui(ui));
-        });
-    }
-    picked
 }
 
 /// Presets, scene, samples and geometry of a simulated array.
@@ -172,22 +156,6 @@ fn automatic_choice_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) 
         };
         dim_ui(ui, &note);
     }
-}
-
-/// The paper's figures of single networks, one click each.
-fn paper_figures_ui(ui: &mut Ui) -> Option<PaperFigure> {
-    let mut picked = None;
-    let width = 0.5 * (ui.available_width() - space(1));
-    ui.spacing_mut().item_spacing = [space(1); 2].into();
-    ui.horizontal_wrapped(|ui| {
-        for figure in PAPER_FIGURES {
-            let button = ghost_button(figure.name).min_size([width, space(7)].into());
-            if ui.add(button).on_hover_text(figure.description).clicked() {
-                picked = Some(figure);
-            }
-        }
-    });
-    picked
 }
 
 /// The button that brings the usual settings of the source back.

@@ -104,7 +104,7 @@ impl Decoders {
         let is_wanted = self.is_open && self.measured.is_none();
         if let (true, Phase::Paused | Phase::Ended(_), Some((run, result))) = (is_wanted, shared.phase, standing) {
             self.of = of;
-            let (problem, test) = (Arc::clone(&run.problem), Arc::clone(run.test.set()));
+            let (problem, test) = (Arc::clone(&run.problem), Arc::clone(&run.test.set));
             self.begin(run.setup.clone(), problem, (*result.networks).clone(), test);
         }
     }

@@ -1,23 +1,19 @@
 //! What the Train view shows of the current training, for export.
 
-use decoupler_core::{
-    dataset::Simulation,
-    evaluation::{DecoderReport, RunSettings},
-    sensor::SensorModel,
-};
+use decoupler_core::evaluation::DecoderReport;
 use decoupler_files::{
     export::{decoder_table, error_table, loss_table},
     figure::surface::ViewMode,
 };
 
 use super::{
-    charts::{NODES, has_target_surface, shown_chart},
-    surfaces::upper_figure,
+    charts::shown_chart,
+    surfaces::{through, upper_figure},
     view::TrainView,
 };
 use crate::window::{
     shared::{
-        FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult, RunView, Shared, Shown, SourceKind, file_stem,
+        FileTask, FileWords, NetworkSource, Phase, RunResult, RunView, Shared, Shown, SourceKind, file_stem,
         saying_saved,
     },
     training_worker::LOST,
@@ -31,12 +27,6 @@ pub const CHECKPOINT: FileWords = FileWords {
     extensions: &["checkpoint"],
 };
 
-const OPENED: FileWords = FileWords {
-    description: "Opens a training saved here or by train --checkpoint in a terminal, with its settings and its \
-                  history, and pauses it. A resumed training gives bit-identical results.",
-    ..CHECKPOINT
-};
-
 /// Task of saving the checkpoint of `run`.
 pub(super) fn checkpoint_task(run: &RunView) -> FileTask {
     let stem = file_stem("training", &run.setup);
@@ -44,17 +34,6 @@ pub(super) fn checkpoint_task(run: &RunView) -> FileTask {
         let file = run.ok_or(LOST)?.checkpoint_file()?;
         Ok(saying_saved(move |path| file.save(path)))
     })
-}
-
-/// Task of opening a checkpoint.
-pub(super) fn open_task(shared: &Shared) -> FileTask {
-    let run = shared.run.as_ref();
-    let setup = run.map_or_else(|| shared.draft.into(), |run| run.setup.clone());
-    FileTask {
-        words: OPENED,
-        suggestion: file_stem("training", &setup) + ".checkpoint",
-        purpose: Purpose::Open,
-    }
 }
 
 /// Returns what the view shows of the current training.
@@ -69,7 +48,7 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     let past = view.scrub.result().map(|past| past.epochs_run);
     let mut shown = networks(view, &trained, past);
     let (name, what) = match shared.look.mode {
-        _ if shared.source == SourceKind::Recording && !has_target_surface(shared) => ("Sample", "sample"),
+        _ if shared.source == SourceKind::Recording && through(shared).is_none() => ("Sample", "sample"),
         ViewMode::ThreeD => ("Surfaces", "surfaces"),
         ViewMode::Top => ("Surfaces", "surfaces-top"),
     };
@@ -138,65 +117,4 @@ fn measured(view: &TrainView) -> Vec<DecoderReport> {
     let results = view.decoders.measured.iter().flatten();
     let reports = results.filter_map(|result| result.report.as_ref()?.as_ref().ok());
     reports.cloned().collect()
-}
-
-/// A figure of the paper that the window can show: its configuration, and how its results are displayed.
-#[derive(Clone, Copy, Debug)]
-pub struct PaperFigure {
-    /// Its array and how it is displayed.
-    pub name: &'static str,
-    /// A description of the figure in a sentence.
-    pub description: &'static str,
-    scale: &'static str,
-    /// How its surfaces are viewed; `None` if it shows none.
-    pub mode: Option<ViewMode>,
-    /// Its chart; `None` if it shows none.
-    pub chart: Option<&'static str>,
-}
-
-/// The figures of the paper, in its order.
-pub const PAPER_FIGURES: [PaperFigure; 4] = [
-    PaperFigure {
-        name: "10×10, top view",
-        description: "Fig. 4: trains 10×10_5×30 with 12 hidden nodes and shows actual and decoded surface from above. \
-                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
-        scale: "10×10_5×30",
-        mode: Some(ViewMode::Top),
-        chart: None,
-    },
-    PaperFigure {
-        name: "10×6, nodes",
-        description: "Fig. 6: trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoded as \
-                      discs.",
-        scale: "10×6_3×18",
-        mode: None,
-        chart: Some(NODES.name),
-    },
-    PaperFigure {
-        name: "10×6, 3-D",
-        description: "Fig. 7: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoded surface in space. \
-                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
-        scale: "10×6_3×18",
-        mode: Some(ViewMode::ThreeD),
-        chart: None,
-    },
-    PaperFigure {
-        name: "10×6, top view",
-        description: "Fig. 8: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoded surface from above. \
-                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
-        scale: "10×6_3×18",
-        mode: Some(ViewMode::Top),
-        chart: None,
-    },
-];
-
-impl PaperFigure {
-    /// Returns the settings of the training for the figure.
-    pub fn settings(&self) -> RunSettings {
-        let scale = self.scale.parse().expect("the paper's arrays are possible");
-        RunSettings::from(Simulation {
-            sensor: SensorModel::new(scale),
-            ..Simulation::default()
-        })
-    }
 }

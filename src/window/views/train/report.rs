@@ -14,16 +14,13 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Layout, Response, RichText, Ui};
 
-use super::{decoders::decoders_ui, exports::open_task, press::press_section_ui, recording::bias, view::TrainView};
+use super::{decoders::decoders_ui, press::press_section_ui, recording::bias, view::TrainView};
 use crate::window::{
     glossary,
     shared::{Effect, NetworkSource, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
-    test_view::TestView,
+    test_view::Skin,
     theme::{space, type_size},
-    widgets::{
-        described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
-        section_heading_ui,
-    },
+    widgets::{described_table_ui, dim_ui, fields::capitalised, fold_ui, note_ui, scrolled_ui, section_heading_ui},
 };
 
 /// The name of the network's row.
@@ -40,15 +37,6 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             Some((run, result)) => errors_ui(ui, view, shared, (run, result), effects),
             None => expectation_ui(ui, shared),
         }
-        section_heading_ui(ui, "Open");
-        let can_open = !shared.phase.is_busy();
-        ui.add_enabled_ui(can_open, |ui| {
-            let button = ghost_button("Open checkpoint…").min_size([ui.available_width(), space(7)].into());
-            let task = open_task(shared);
-            if ui.add(button).on_hover_text(task.words.description).clicked() {
-                effects.push(Effect::ChooseFile(task));
-            }
-        });
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
             cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
@@ -72,13 +60,13 @@ fn errors_ui(
         (None, Some(reason)) => verdict_ui(ui, shared, (run, result), reason),
         (None, None) => {}
     }
-    if let Some(test) = run.test.array() {
-        conditioning_ui(ui, test);
+    if let Some(skin) = &run.test.skin {
+        conditioning_ui(ui, skin);
     }
     if let Some(note) = run.baselines.model_based_note() {
         note_ui(ui, note);
     }
-    if let (Some(errors), Some(test)) = (result.errors.nodes(), run.test.array()) {
+    if let (Some(errors), Some(skin)) = (result.errors.nodes(), &run.test.skin) {
         let worst = errors.worst_node;
         ui.add_space(space(1));
         let text = format!("Worst node {} mm", format_number(errors.worst_mm));
@@ -91,7 +79,7 @@ fn errors_ui(
         let (name, show) = line_ui(ui, text, show_ui);
         name.on_hover_text(glossary::WORST_NODE.hint);
         if show.clicked() {
-            view.go_to(worst.snapshot, test.node(worst));
+            view.go_to(worst.snapshot, skin.node(worst));
         }
     }
     let model_based = run.baselines.model_based.as_ref().and_then(TestErrors::nodes);
@@ -170,7 +158,9 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         rows.filter(|row| row.name == NETWORK)
             .for_each(|row| row.errors.fill(None));
         error_table_ui(ui, &tables);
-        conditioning_ui(ui, &preview.test);
+        if let Some(skin) = &preview.test.skin {
+            conditioning_ui(ui, skin);
+        }
         ui.add_space(space(2));
     }
     // The paper's own network, not only its scene.
@@ -264,8 +254,8 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
 }
 
 /// Notes that the scene is ill-conditioned, so that its errors are not blamed on the network.
-fn conditioning_ui(ui: &mut Ui, test: &TestView) {
-    let condition = test.outlook.as_ref().map(|outlook| outlook.worst_row.condition());
+fn conditioning_ui(ui: &mut Ui, skin: &Skin) {
+    let condition = skin.outlook.as_ref().map(|outlook| outlook.worst_row.condition());
     let Some(condition) = condition.filter(|condition| *condition >= Identifiability::LARGEST_CONDITION) else {
         return;
     };

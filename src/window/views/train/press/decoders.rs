@@ -16,7 +16,7 @@ use decoupler_files::machine::memory_budget;
 use super::solving::{Answer, Question, Subject, decode};
 use crate::window::{
     job::{Background, JobError, Report, Wake},
-    test_view::TestView,
+    test_view::Skin,
 };
 
 /// Decoders compared with the network, the fastest first.
@@ -75,7 +75,7 @@ impl Comparison {
     }
 
     /// Takes answers, and asks about the pressed sensor of `question`, unless its network still learns.
-    pub(super) fn follow(&mut self, question: &Question, pressed: &TestView) {
+    pub(super) fn follow(&mut self, question: &Question, pressed: &Arc<Dataset>) {
         let subject = question.subject.as_ref().filter(|subject| subject.is_idle);
         let networks = subject.map(|subject| &subject.networks);
         if self.of.as_ref().map(Arc::as_ptr) != networks.map(Arc::as_ptr) {
@@ -93,10 +93,7 @@ impl Comparison {
                 None => {}
             }
         }
-        let is_asked = self
-            .asked
-            .as_ref()
-            .is_some_and(|asked| Arc::ptr_eq(asked, &pressed.set));
+        let is_asked = self.asked.as_ref().is_some_and(|asked| Arc::ptr_eq(asked, pressed));
         let Some(subject) = subject.filter(|_| !is_asked) else {
             return;
         };
@@ -104,17 +101,23 @@ impl Comparison {
             // Its decoder answers, or is fitted, and then they are asked about this touch.
             return self.job.cancel();
         }
-        (self.asked, self.failure) = (Some(Arc::clone(&pressed.set)), None);
-        let (subject, pressed, fitted) = (subject.clone(), pressed.clone(), Arc::clone(&self.fitted));
+        (self.asked, self.failure) = (Some(Arc::clone(pressed)), None);
+        let (subject, pressed, fitted) = (subject.clone(), Arc::clone(pressed), Arc::clone(&self.fitted));
+        let stroke_mm = question.skin.stroke_mm;
         self.job.start(
-            move |report| compare(&subject, &pressed, &fitted, report),
+            move |report| compare(&subject, (&pressed, stroke_mm), &fitted, report),
             |ended| ended.err().map(Err),
         );
     }
 }
 
 /// Asks one decoder after the other, each fitted when it is first asked.
-fn compare(subject: &Subject, pressed: &TestView, fitted: &Fitted, report: &Report<CompareEvent>) {
+fn compare(
+    subject: &Subject,
+    (pressed, stroke_mm): (&Arc<Dataset>, f64),
+    fitted: &Fitted,
+    report: &Report<CompareEvent>,
+) {
     // Only one job runs at a time, and a panic leaves whole decoders.
     let mut fitted = fitted.lock().unwrap_or_else(PoisonError::into_inner);
     let mut set = None;
@@ -133,10 +136,10 @@ fn compare(subject: &Subject, pressed: &TestView, fitted: &Fitted, report: &Repo
             fitted.push(decoder);
         }
         let answer = match &mut fitted[index] {
-            Ok(decoder) => decode(&mut **decoder, pressed).map(|(_, answer)| answer),
+            Ok(decoder) => decode(&mut **decoder, pressed, stroke_mm).map(|(_, answer)| answer),
             Err(reason) => Err(reason.clone()),
         };
-        let of = Arc::clone(&pressed.set);
+        let of = Arc::clone(pressed);
         report.send(Some(Ok(Compared { kind, answer, of })));
         if report.is_cancelled() {
             return;
@@ -175,9 +178,9 @@ impl Demo {
         }
     }
 
-    /// Takes the network for the sensor of `test`, which is trained unless that takes long.
-    pub(super) fn follow(&mut self, test: &TestView) {
-        let settings = demo_settings(test);
+    /// Takes the network for the sensor of `skin`, which is trained unless that takes long.
+    pub(super) fn follow(&mut self, skin: &Skin) {
+        let settings = demo_settings(skin);
         if self.settings != settings {
             (self.settings, self.subject) = (settings, None);
             self.job.abandon();
@@ -211,34 +214,34 @@ fn train(settings: RunSettings, job: &Job<'_>) -> Result<Networks, RunError> {
     Ok(run.network())
 }
 
-/// Returns the settings of a small network that learns imprints of balls on the sensor of `test` in a fraction of a second,
+/// Returns the settings of a small network that learns imprints of balls on the sensor of `skin` in a fraction of a second,
 /// with its rows and stroke, and without noise; `None` for arrays for which training would take longer.
 ///
 /// One network for each known row, with conductances scaled to [−1, 1], was the best choice for so few samples.
-fn demo_settings(test: &TestView) -> Option<RunSettings> {
+fn demo_settings(skin: &Skin) -> Option<RunSettings> {
     /// Number of training samples per row.
     const SAMPLES: usize = 200;
     /// Maximum number of pairs of nodes in all samples: about a tenth of a second.
     const MAX_PAIRS: f64 = 5e7;
     /// Maximum number of unknowns and readings of all rows, with which the time of an epoch grows.
     const MAX_CHANNELS: usize = 2000;
-    let (scale, rows) = (test.sensor.scale, test.rows.len());
+    let (scale, rows) = (skin.sensor.scale, skin.rows.len());
     let samples = SAMPLES * rows;
     let channels = rows * (scale.nodes_per_row() + scale.columns());
-    if samples as f64 * node_pairs_per_row(&test.sensor) > MAX_PAIRS || channels > MAX_CHANNELS {
+    if samples as f64 * node_pairs_per_row(&skin.sensor) > MAX_PAIRS || channels > MAX_CHANNELS {
         return None;
     }
     let scene = Scene {
-        rows: match test.rows[..] {
+        rows: match skin.rows[..] {
             [row] => Rows::One(row),
             _ => Rows::Known,
         },
         loading: Loading::Indenter(Indenter::default()),
-        largest_compression: test.stroke_mm / test.sensor.geometry.height_mm,
+        largest_compression: skin.stroke_mm / skin.sensor.geometry.height_mm,
         ..Scene::default()
     };
     let mut settings = RunSettings::from(Simulation {
-        sensor: test.sensor,
+        sensor: skin.sensor,
         scene,
         samples,
         validation_samples: 0,

@@ -24,7 +24,7 @@ use crate::window::{
     job::{Background, JobError, Wake},
     shared::{RunResult, Shared},
     surface_view::SurfaceViewResponse,
-    test_view::TestView,
+    test_view::Skin,
 };
 
 pub use section::{press_section_ui, readings_head_ui, readings_ui};
@@ -33,8 +33,6 @@ pub use solving::Shown;
 /// The finger, what it presses, and everything known about that.
 #[derive(Debug)]
 pub struct PressState {
-    /// Work of the pointer on the actual surface.
-    pub hand: Hand,
     /// The finger that presses.
     pub finger: Finger,
     /// Place that it presses; `None` while the test set is displayed.
@@ -58,7 +56,6 @@ impl PressState {
     /// Nothing pressed. `wake` is called when something was computed in the background.
     pub fn new(wake: &Wake) -> Self {
         Self {
-            hand: Hand::default(),
             finger: Finger::default(),
             place_mm: None,
             grip_mm: None,
@@ -87,9 +84,9 @@ impl PressState {
     }
 
     /// Presses the middle of the nodes.
-    pub fn press_middle(&mut self, test: &TestView) {
-        let (geometry, scale) = (&test.sensor.geometry, test.sensor.scale);
-        let [first, last] = [test.rows.first(), test.rows.last()].map(|row| row.copied().unwrap_or(0));
+    pub fn press_middle(&mut self, skin: &Skin) {
+        let (geometry, scale) = (&skin.sensor.geometry, skin.sensor.scale);
+        let [first, last] = [skin.rows.first(), skin.rows.last()].map(|row| row.copied().unwrap_or(0));
         let first = geometry.row_node_mm(scale, first, 0);
         let last = geometry.row_node_mm(scale, last, scale.nodes_per_row() - 1);
         self.place_mm = Some(0.5 * (first + last).truncate());
@@ -107,7 +104,7 @@ impl PressState {
 
     /// Has the touch answered, one question at a time; `result` is that of the displayed network.
     pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
-        let Some(test) = shared.test() else {
+        let Some(skin) = shared.skin() else {
             // A recording has no sensor model to press.
             self.let_go();
             self.target = None;
@@ -116,7 +113,7 @@ impl PressState {
         if self
             .answered
             .as_ref()
-            .is_some_and(|(question, _)| !question.is_of(test))
+            .is_some_and(|(question, _)| !question.is_of(skin))
         {
             // Another array, or another scene.
             self.let_go();
@@ -129,12 +126,12 @@ impl PressState {
             is_idle: result.is_idle,
         });
         if own.is_none() {
-            self.demo.follow(test);
+            self.demo.follow(skin);
         }
         let question = Question {
             finger: self.finger,
             place_mm,
-            test: test.clone(),
+            skin: Arc::clone(skin),
             subject: own.or_else(|| self.demo.subject.clone()?.ok()),
         };
         while let Some(answered) = self.solving.next_event() {
@@ -171,16 +168,6 @@ struct Target {
     rect: Rect,
     sight: Sight,
     surface: Surface,
-}
-
-/// Work of the pointer on the actual surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Hand {
-    /// It presses.
-    #[default]
-    Press,
-    /// It turns the surface.
-    Turn,
 }
 
 /// The ball that presses.

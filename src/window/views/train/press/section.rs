@@ -20,7 +20,7 @@ use crate::window::{
     glossary,
     plotting::cells_ui,
     shared::Shared,
-    test_view::TestView,
+    test_view::Skin,
     theme::{Theme, semibold, space, type_size},
     widgets::{
         TableColumn, TableRow, TableView, dim_ui, note_ui, number_ui, placeholder_ui, refusal_ui, section_heading_ui,
@@ -38,9 +38,9 @@ const COLUMNS: [TableColumn<'_>; 4] = [
 
 /// The finger, and the answers of all decoders to it.
 pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
-    let Some(test) = shared.test() else { return };
+    let Some(skin) = shared.skin() else { return };
     section_heading_ui(ui, "Press");
-    finger_ui(ui, press, test.stroke_mm);
+    finger_ui(ui, press, skin.stroke_mm);
     ui.add_space(space(1));
     match &press.answered {
         Some((question, Ok(shown))) => {
@@ -56,7 +56,10 @@ pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
         None => {
             // The surface shows it too: in a low window the error table comes first.
             if ui.clip_rect().height() > space(70) {
-                dim_ui(ui, "Press on the actual surface; the wheel sets the depth.");
+                dim_ui(
+                    ui,
+                    "Press on the actual surface; the wheel sets the depth. Drag with the right button or Shift to turn it.",
+                );
             }
             return;
         }
@@ -125,7 +128,7 @@ fn answers_ui(ui: &mut Ui, press: &PressState, question: &Question, shown: &Show
     let others = KINDS.iter().filter(|_| is_compared).map(|&kind| {
         let compared = answers.iter().find(|compared| compared.kind == kind);
         // Answers to an earlier touch are pale.
-        let is_present = compared.is_some_and(|compared| Arc::ptr_eq(&compared.of, &shown.pressed.set));
+        let is_present = compared.is_some_and(|compared| Arc::ptr_eq(&compared.of, &shown.pressed));
         let colour = if is_present { palette.text } else { palette.dim };
         (kind, compared.map(|compared| &compared.answer), colour)
     });
@@ -175,7 +178,7 @@ fn microseconds(time: Duration) -> String {
 fn remarks_ui(ui: &mut Ui, press: &PressState, question: &Question, shown: &Shown, shared: &Shared) {
     if shown.outside > 0 {
         let (outside, verb) = (shown.outside, if shown.outside == 1 { "is" } else { "are" });
-        let readings = counted(shown.pressed.set.readings().len(), "reading");
+        let readings = counted(shown.pressed.readings().len(), "reading");
         let text = format!(
             "{outside} of {readings} {verb} outside the range of the network's training set: there it extrapolates."
         );
@@ -233,21 +236,21 @@ pub fn readings_head_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>) {
 pub fn readings_ui(
     ui: &mut Ui,
     drops_percent: Option<&Array2<f64>>,
-    test: Option<&TestView>,
+    skin: Option<&Skin>,
     lit_row: Option<usize>,
     colours: SequentialMap,
 ) -> Option<ReadingPointed> {
-    let Some((drops_percent, test)) = drops_percent.zip(test) else {
+    let Some((drops_percent, skin)) = drops_percent.zip(skin) else {
         placeholder_ui(ui, "The readings of the surface appear here.");
         return None;
     };
     let end = end_of_scale(drops_percent);
-    let map = readings_figure(drops_percent.clone(), &test.rows, end).coloured(colours);
+    let map = readings_figure(drops_percent.clone(), &skin.rows, end).coloured(colours);
     let marked = (lit_row.as_slice(), &[][..], Theme::of(ui).palette.text);
     let ([row, column], cell) = cells_ui(ui, "Readings of the actual surface", &map, marked)?;
     let is_clicked = cell.clicked();
     let value = format_number(map.values[[row, column]]);
-    let wire = test.rows.get(row).map_or(0, |row| row + 1);
+    let wire = skin.rows.get(row).map_or(0, |row| row + 1);
     cell.on_hover_text_at_pointer(format!(
         "Row-wire {wire}, column-wire {}\ndrop from unloaded: {value} %\n{}\nClick for the section along it.",
         column + 1,

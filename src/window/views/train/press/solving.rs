@@ -15,7 +15,7 @@ use glam::DVec2;
 use ndarray::Array2;
 
 use super::Finger;
-use crate::window::test_view::{Drawing, TestView};
+use crate::window::test_view::{Drawing, Skin};
 
 /// The network that decodes the touch.
 #[derive(Clone, Debug)]
@@ -35,20 +35,20 @@ pub(super) struct Subject {
 pub(super) struct Question {
     pub(super) finger: Finger,
     pub(super) place_mm: DVec2,
-    pub(super) test: TestView,
+    pub(super) skin: Arc<Skin>,
     pub(super) subject: Option<Subject>,
 }
 
 impl Question {
     /// Returns true if both questions are the same.
     pub(super) fn is(&self, other: &Self) -> bool {
-        self.is_of(&other.test) && self.key() == other.key()
+        self.is_of(&other.skin) && self.key() == other.key()
     }
 
     /// Returns true if it is about this sensor, with the same rows and stroke: a new training has another test set of the
     /// same sensor.
-    pub(super) fn is_of(&self, test: &TestView) -> bool {
-        (self.test.sensor, self.test.stroke_mm) == (test.sensor, test.stroke_mm) && self.test.rows == test.rows
+    pub(super) fn is_of(&self, skin: &Skin) -> bool {
+        (self.skin.sensor, self.skin.stroke_mm) == (skin.sensor, skin.stroke_mm) && self.skin.rows == skin.rows
     }
 
     fn key(&self) -> (Finger, DVec2, Option<*const Networks>) {
@@ -60,8 +60,8 @@ impl Question {
 /// What is shown of a touch.
 #[derive(Clone, Debug)]
 pub struct Shown {
-    /// The pressed sensor: a test set of one snapshot, without noise.
-    pub(super) pressed: TestView,
+    /// The pressed sensor: one snapshot, without noise.
+    pub(super) pressed: Arc<Dataset>,
     /// Its surface, the network's, and their difference.
     pub drawing: Drawing,
     /// Drops of its readings below those at rest, in percent: rows read × M4.
@@ -84,13 +84,13 @@ pub(super) struct Answer {
 pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
     let shown = press(&question).map(|pressed| {
         let networks = question.subject.as_ref().map(|subject| &*subject.networks);
-        let decoded = networks.map(|networks| decode(&mut networks.decoder(), &pressed));
+        let decoded = networks.map(|networks| decode(&mut networks.decoder(), &pressed, question.skin.stroke_mm));
         let answers = decoded.as_ref().and_then(|decoded| decoded.as_ref().ok());
         Shown {
-            drawing: pressed.drawing(answers.map(|(answers, _)| answers), 0),
-            drops_percent: pressed.drops_percent(&pressed.readings_ohm(0)),
+            drawing: question.skin.drawing(&pressed, answers.map(|(answers, _)| answers), 0),
+            drops_percent: question.skin.drops_percent(&pressed, 0),
             answer: decoded.map(|decoded| decoded.map(|(_, answer)| answer)),
-            outside: networks.map_or(0, |networks| outside(networks, &pressed.set)),
+            outside: networks.map_or(0, |networks| outside(networks, &pressed)),
             pressed,
         }
     });
@@ -98,12 +98,12 @@ pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
 }
 
 /// Returns the sensor pressed: positions of its nodes, and readings of its wires by Eq. (2).
-fn press(question: &Question) -> Result<TestView, String> {
+fn press(question: &Question) -> Result<Arc<Dataset>, String> {
     let Question {
-        finger, place_mm, test, ..
+        finger, place_mm, skin, ..
     } = question;
-    let (sensor, rows) = (&test.sensor, &test.rows);
-    let depth_mm = finger.depth_share * test.stroke_mm;
+    let (sensor, rows) = (&skin.sensor, &skin.rows);
+    let depth_mm = finger.depth_share * skin.stroke_mm;
     let deformation = finger.indenter().press(sensor, *place_mm, depth_mm);
     let (mut readings_ohm, mut places_mm) = (Vec::new(), Vec::new());
     for &row in rows {
@@ -120,23 +120,22 @@ fn press(question: &Question) -> Result<TestView, String> {
         Array2::from_shape_vec(shape, values).expect("every row has as many values")
     });
     let set = Dataset::new(readings_ohm, places_mm, Some(rows), vec![0; rows.len()]);
-    let set = Arc::new(set.map_err(|error| error.to_string())?);
-    Ok(TestView {
-        snapshots: Arc::new(set.snapshots()),
-        set,
-        ..test.clone()
-    })
+    Ok(Arc::new(set.map_err(|error| error.to_string())?))
 }
 
 /// Decodes a pressed sensor; the answers are rows read × 3·M2.
-pub(super) fn decode(decoder: &mut dyn Decoder, pressed: &TestView) -> Result<(Array2<f64>, Answer), String> {
+pub(super) fn decode(
+    decoder: &mut dyn Decoder,
+    pressed: &Dataset,
+    stroke_mm: f64,
+) -> Result<(Array2<f64>, Answer), String> {
     /// Number of repeats.
     const REPEATS: usize = 4;
     /// Maximum time spent on the repeats.
     const LONGEST: Duration = Duration::from_millis(30);
     let mut timed = || {
         let begun = Instant::now();
-        let answers = decode_set(decoder, &pressed.set).map_err(|error| error.to_string())?;
+        let answers = decode_set(decoder, pressed).map_err(|error| error.to_string())?;
         Ok::<_, String>((answers, begun.elapsed()))
     };
     let begun = Instant::now();
@@ -146,7 +145,7 @@ pub(super) fn decode(decoder: &mut dyn Decoder, pressed: &TestView) -> Result<(A
             time = time.min(timed()?.1);
         }
     }
-    let errors = Errors::measure(&pressed.set, &answers, pressed.stroke_mm);
+    let errors = Errors::measure(pressed, &answers, stroke_mm);
     Ok((answers, Answer { errors, time }))
 }
 
