@@ -50,7 +50,7 @@ fn chosen_settings_are_disabled_show_what_was_chosen_and_are_kept_when_the_choic
     let run = driver.state().run.as_ref().unwrap();
     let (setup, asked) = (run.setup.clone(), run.asked.clone());
     let chosen: RunSettings = *setup.settings();
-    assert_ne!(&chosen, asked.settings(), "the choice differs from the defaults");
+    assert_ne!(chosen, asked.settings, "the choice differs from the defaults");
     let expected = [
         ("Hidden nodes", chosen.hidden.to_string()),
         ("Method", chosen.training.method.name().to_owned()),

@@ -96,6 +96,13 @@ impl Driver {
         driver
     }
 
+    /// Opens the window with its state remembered in a file, and its runs kept in a folder.
+    pub(crate) fn open_again(file: &Path, runs: &Path) -> Self {
+        let (file, runs) = (WindowFile::read(file.to_owned()), runs.to_owned());
+        let keeping = |window: DecouplerWindow| window.keeping_runs(runs);
+        Self::open_as(vec2(1440.0, 900.0), Some(file), keeping).on_the_papers_scene()
+    }
+
     fn open_as(
         size: Vec2,
         file: Option<WindowFile>,

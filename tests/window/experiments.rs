@@ -217,10 +217,10 @@ fn invalid_lists_say_why_until_they_are_fixed() {
     driver.click("Table 2");
     driver.enter("Folds", "500");
     assert!(driver.says("500 folds of 100 samples"), "{:#?}", driver.texts());
-    driver.click("Reset to the paper's values");
+    driver.click("Reset to the default values");
     assert!(driver.is_enabled("▶ Run"));
     driver.click("Table 1");
-    driver.click("Reset to the paper's values");
+    driver.click("Reset to the default values");
     assert!(driver.is_enabled("▶ Run"));
 }
 
@@ -241,8 +241,8 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     experiment.base.training.stopping.epochs = 3;
     let results = by_library(&experiment);
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
-        let percent = decoupler_files::export::format_percent(cell.percent().median);
-        let label = format!("{z}: median Z error {percent}");
+        let percent = decoupler_files::export::format_number(cell.percent().median);
+        let label = format!("{z}, Z % median: {percent}");
         assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     }
     driver.settle();
@@ -337,6 +337,7 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_shown_as_it_grows() {
     }
     fs::write(home.path().join("trials").join(format!("{}.json", "0".repeat(32))), "{").unwrap();
     driver.wait("the damaged file", |driver| driver.says("00000000"));
+    driver.click("■ Cancel");
     run_to_the_end(&mut driver);
     assert!(!driver.says("Sweep folder"), "results replace the folder");
 
@@ -361,8 +362,8 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     driver.enter("Epochs", "5");
     run_to_the_end(&mut driver);
     let alone = trained(&plan(&path));
-    let percent = decoupler_files::export::format_percent(alone.errors().percent());
-    let label = format!("12, minmax: median mean absolute error {percent}");
+    let percent = decoupler_files::export::format_number(alone.errors().percent());
+    let label = format!("12, minmax, error % median: {percent}");
     assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     driver.click("Cell 12, minmax");
     driver.click(OPEN);

@@ -132,7 +132,7 @@ fn exports_at_every_fault() {
                 driver.type_into(label, text);
             }
             driver.enter("Maximum epochs", "1");
-            driver.click("▶ Measure");
+            driver.click("▶ Run");
             driver.wait("the end", |driver| !driver.is_enabled("■ Cancel"));
         }
         if view == "Table 1" {

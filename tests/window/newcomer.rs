@@ -187,10 +187,10 @@ fn empty_views_fill_on_a_click() {
     assert!(driver.is_enabled("Train a network now"));
     driver.click_button("Study");
     driver.settle();
-    assert!(driver.is_enabled("Run now"));
+    assert!(driver.is_enabled("▶ Run"));
     driver.click("Speed against accuracy");
     driver.settle();
-    assert!(driver.is_enabled("Measure now"));
+    assert!(driver.is_enabled("▶ Run"));
     driver.click_button("Train");
     driver.settle();
     driver.click("▶ Train");
@@ -199,7 +199,7 @@ fn empty_views_fill_on_a_click() {
     });
     driver.click_button("Study");
     driver.click("Table 1");
-    driver.click_button("Run now");
+    driver.click_button("▶ Run");
     driver.wait("the experiment", |driver| driver.is_enabled("■ Cancel"));
     driver.click("■ Cancel");
 }

@@ -101,7 +101,7 @@ fn view<'a>(surface: &'a Surface, figure: &'a SurfaceFigure) -> SurfaceView<'a> 
 }
 
 fn theme_of(is_dark: bool) -> &'static Theme {
-    if is_dark { Theme::dark() } else { Theme::light() }
+    Theme::get(is_dark)
 }
 
 fn harness<'a>(size: Vec2, is_dark: bool, app: impl FnMut(&mut egui::Ui) + 'a) -> Harness<'a> {

@@ -42,11 +42,17 @@ fn invalid_values_are_rejected_in_place_and_the_old_value_stays() {
         (
             "Height",
             "5 kg",
-            "“kg” is not a unit of this field: type mm, µm, nm, cm, m, in or none.",
+            "“kg” is not a unit of this field: type mm, µm, cm, m, in or none.",
         ),
         ("Height", "thick", "“thick” is not a number: type, for example, 0.5 mm."),
         ("Largest compression", "120 %", "120 % is too large: at most 99 %."),
         ("Seed", "-1", "−1 is too small: at least 0."),
+        // No digit is lost unnoticed.
+        (
+            "Seed",
+            "9007199254740993",
+            "9007199254740992 is too large: at most 9007199254740991.",
+        ),
     ] {
         driver.enter(field, typed);
         assert!(driver.has(reason), "{field}: {typed}: {:#?}", driver.texts());
@@ -55,8 +61,6 @@ fn invalid_values_are_rejected_in_place_and_the_old_value_stays() {
         let described = driver.harness().get(by).accesskit_node().description();
         assert_eq!(described.as_deref(), Some(reason), "it is read out with the field");
     }
-    driver.enter("Seed", "9007199254740993");
-    assert_eq!(driver.state().draft.seed.0, (1 << 53) + 1, "every digit counts");
     driver.enter("Hidden nodes", "7");
     assert!(!driver.says("too small: at least 1"), "the next number settles it");
     assert_eq!(driver.state().draft.hidden, 7);

@@ -177,7 +177,7 @@ impl Row {
 /// Returns the definition of a term.
 pub fn meaning(term: &str) -> Option<&'static str> {
     static HINTS: LazyLock<HashMap<&str, &str>> = LazyLock::new(|| {
-        let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
+        let terms = glossary::groups().into_iter().flat_map(|(_, terms)| terms);
         terms.map(|term| (term.name, term.hint)).collect()
     });
     HINTS.get(term).copied()

@@ -55,8 +55,8 @@ impl DecouplerWindow {
         let drafts = drafts(shared);
         let scale = self.ctx.zoom_factor();
         let heights = match look.heights {
-            HeightScale::Stroke => Command::FreeHeights,
-            HeightScale::Fitted => Command::LockHeights,
+            HeightScale::Stroke => ("Free the scale of heights", HeightScale::Fitted),
+            HeightScale::Fitted => ("Lock the scale of heights", HeightScale::Stroke),
         };
         let mut commands = vec![
             (Command::Undo, is_free && self.undoer.has_undo(&drafts)),
@@ -66,8 +66,11 @@ impl DecouplerWindow {
         commands.push((if look.is_dark { Command::Light } else { Command::Dark }, true));
         commands.extend(SequentialMap::ALL.map(|map| (Command::Colours(map), map != look.colours)));
         commands.extend([
-            (heights, true),
-            (Command::FreeErrors, look.error_limit_mm.is_some()),
+            (Command::Scale(heights.0, heights.1, look.error_limit_mm), true),
+            (
+                Command::Scale("Free the scale of errors", look.heights, None),
+                look.error_limit_mm.is_some(),
+            ),
             (Command::Larger, scale < *SCALES.end() - 0.5 * STEP),
             (Command::Smaller, scale > *SCALES.start() + 0.5 * STEP),
             (Command::UsualSize, (scale - 1.0).abs() > 0.5 * STEP),
@@ -94,23 +97,12 @@ impl DecouplerWindow {
             Command::Show(view) => self.show(*view),
             Command::Dark | Command::Light => {
                 let is_dark = *command == Command::Dark;
-                self.chosen.is_dark = Some(is_dark);
-                self.set_dark(is_dark);
+                self.look(Look { is_dark, ..look });
             }
-            Command::Colours(colours) => self.look(Look {
-                colours: *colours,
-                ..look
-            }),
-            Command::LockHeights => self.look(Look {
-                heights: HeightScale::Stroke,
-                ..look
-            }),
-            Command::FreeHeights => self.look(Look {
-                heights: HeightScale::Fitted,
-                ..look
-            }),
-            Command::FreeErrors => self.look(Look {
-                error_limit_mm: None,
+            &Command::Colours(colours) => self.look(Look { colours, ..look }),
+            &Command::Scale(_, heights, error_limit_mm) => self.look(Look {
+                heights,
+                error_limit_mm,
                 ..look
             }),
             Command::Larger => self.set_scale(self.ctx.zoom_factor() + STEP),
@@ -139,7 +131,7 @@ impl DecouplerWindow {
             return;
         };
         match &recording.plan {
-            Ok(plan) if !self.shared.recording.is_plan(Some(plan)) => self.views.open_plan(plan),
+            Ok(plan) if self.shared.recording.plan.as_ref() != Ok(plan) => self.views.open_plan(plan),
             Ok(_) => {}
             // Undoing closes no files.
             Err(_) => recording.plan.clone_from(&self.shared.recording.plan),

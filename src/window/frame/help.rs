@@ -106,16 +106,13 @@ fn glossary_ui(ui: &mut Ui, typed: &mut String) {
         .min_scrolled_height(space(112));
     scroll.auto_shrink([false, true]).show(ui, |ui| {
         let mut is_any = false;
-        for group in glossary::groups() {
-            let found: Vec<&Term> = group.terms.iter().filter(|term| term.matches(typed)).collect();
-            if found.is_empty() {
-                continue;
+        for (heading, mut terms) in glossary::groups() {
+            terms.retain(|term| term.matches(typed));
+            if !terms.is_empty() {
+                is_any = true;
+                section_heading_ui(ui, heading);
             }
-            is_any = true;
-            section_heading_ui(ui, group.heading);
-            for term in found {
-                term_ui(ui, term);
-            }
+            terms.iter().for_each(|term| term_ui(ui, term));
         }
         if !is_any {
             dim_ui(ui, "No matches");

@@ -19,7 +19,7 @@ use crate::window::{
     glossary,
     shared::{About, Command, Effect, Exporting, Offer},
     theme::{Theme, space},
-    widgets::dim_ui,
+    widgets::{dim_ui, hinted},
 };
 
 /// The open modal.
@@ -129,11 +129,7 @@ impl Line {
         });
         let line = line.inner.on_disabled_hover_text("Not available now");
         line.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &self.label));
-        if self.hint.is_empty() {
-            line
-        } else {
-            line.on_hover_text(self.hint)
-        }
+        hinted(line, self.hint)
     }
 }
 
@@ -198,7 +194,7 @@ fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
         }
     }
     found.sort_by_key(|(rank, _)| *rank);
-    let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
+    let terms = glossary::groups().into_iter().flat_map(|(_, terms)| terms);
     let terms = terms.filter(|term| !words.is_empty() && has_words(term.name));
     let terms = terms.map(|term| Line {
         name: term.name.to_owned(),

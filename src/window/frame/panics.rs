@@ -134,7 +134,7 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
     });
     driver.enter("Height", "8");
     driver.wait("the analysis", |driver| driver.says("Condition number: "));
-    panics(&mut driver, "clipboard", |driver| {
+    panics(&mut driver, "picture", |driver| {
         driver.choose_export("Singular values, Copy");
         driver.click_button("Copy");
     });

@@ -1,29 +1,31 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use decoupler_files::export::exit_leaving_nothing;
-use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui, UiBuilder};
+use eframe::egui::{self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder};
 
 use super::{
-    clipboard::Copying,
     commands::{DraftsUndoer, SCALES, drafts},
     export_dialog::{card_menu_ui, export_menu_ui},
     files::{Dialogs, Files},
     modal::Modal,
     notices::Notices,
     remembered::{Memory, Remembered, WindowFile},
-    top_bar::{edge_ui, top_bar_ui, widths_points},
+    top_bar::top_bar_ui,
 };
 use crate::{
     signals::on_termination,
     window::{
         job::{Background, Wake},
         preview::PreviewEvent,
-        shared::{Command, Effect, Matter, Notice, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
+        shared::{Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
         theme::{self, Theme, space},
         training_worker::{Request, Worker},
         views::Views,
     },
 };
+
+/// A picture to be copied, and the message for the user.
+pub(super) type Drawn = Result<(ColorImage, String), String>;
 
 /// The window: the shared state, the views, and the one place where their effects are applied.
 pub struct DecouplerWindow {
@@ -39,8 +41,11 @@ pub struct DecouplerWindow {
     pub(super) keeping: Option<(PathBuf, Duration)>,
     pub(super) previews: Background<PreviewEvent>,
     pub(super) runs: RunsWorker,
+    /// The run of the list that is being opened, the last one after the start if not one that the user chose.
+    pub(super) opening: Background<(bool, Result<Box<RunView>, String>)>,
     pub(super) files: Files,
-    pub(super) copying: Copying,
+    /// Pictures that are drawn to be copied; the newest wins.
+    pub(super) pictures: Background<Drawn>,
     pub(super) dialogs: Dialogs,
     /// Command picked from the list or by a button, which is carried out in the next frame.
     pub(super) picked: Option<Command>,
@@ -84,8 +89,8 @@ impl DecouplerWindow {
         }
         shared.source = remembered.source.unwrap_or_default();
         if let Some(plan) = remembered.plan.take() {
-            views.open_plan(&plan.0);
-            shared.recording.plan = Ok(plan.0);
+            views.open_plan(&plan);
+            shared.recording.plan = Ok(plan);
         }
         let shown = ViewKind::ALL
             .into_iter()
@@ -101,8 +106,9 @@ impl DecouplerWindow {
             keeping: None,
             previews: Background::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
+            opening: Background::new("opened run", Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
-            copying: Copying::new(desktop, Arc::clone(&wake)),
+            pictures: Background::prompt("picture", Arc::clone(&wake)),
             dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
             picked: None,
             undoer: DraftsUndoer::default(),
@@ -188,8 +194,12 @@ impl DecouplerWindow {
         let view = self.views.get(kind);
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
-        let columns = kind.columns(ui.available_width());
-        let [form_width, report_width] = widths_points(&columns, &self.chosen, ui.available_width());
+        // Widths of the columns at which their names do not touch their values, and at which the table fits.
+        let [form_min, report_min] = [space(62), space(82)];
+        let has_report = kind.has_report(ui.available_width());
+        // Wider columns must leave the middle this width.
+        let within = |min: f32, max: f32, room: f32| Rangef::new(min, (room - space(176)).clamp(min, max));
+        let for_form = ui.available_width() - if has_report { report_min } else { 0.0 };
         // The strip of the scroll bar is the margin on the right.
         let side = Margin {
             left: 12,
@@ -211,17 +221,22 @@ impl DecouplerWindow {
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| ui.max_rect());
         let form = Panel::left("configuration")
-            .exact_size(form_width)
-            .resizable(false)
+            .default_size(self.chosen.form_points.unwrap_or(space(68)))
+            .size_range(within(form_min, space(110), for_form))
             .frame(panel(side))
             .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
-        let report = columns.has_report.then(|| {
+        self.chosen.form_points = Some(form.response.rect.width());
+        let report = has_report.then(|| {
+            let for_report = ui.available_width();
             Panel::right("report")
-                .exact_size(report_width)
-                .resizable(false)
+                .default_size(self.chosen.report_points.unwrap_or(space(96)))
+                .size_range(within(report_min, space(140), for_report))
                 .frame(panel(side))
                 .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
         });
+        if let Some(report) = &report {
+            self.chosen.report_points = Some(report.response.rect.width());
+        }
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
         let middle = egui::CentralPanel::default()
             .frame(background)
@@ -231,17 +246,6 @@ impl DecouplerWindow {
         let parts = [Some(&middle.response), report.as_ref().map(|report| &report.response)];
         for part in parts.into_iter().flatten() {
             card_menu_ui(part, || view.shown(shared), &mut effects);
-        }
-        edge_ui(
-            ui,
-            "Width of the left column",
-            form.response.rect,
-            true,
-            &mut self.chosen.form_points,
-        );
-        if let Some(report) = report {
-            let width = &mut self.chosen.report_points;
-            edge_ui(ui, "Width of the right column", report.response.rect, false, width);
         }
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
@@ -291,11 +295,11 @@ impl eframe::App for DecouplerWindow {
     }
 }
 
-/// Services of the desktop that the window uses: file dialogs and the clipboard.
+/// The file dialogs that the window uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Desktop {
     /// The desktop's own.
     Native,
-    /// None: the window asks for paths itself, and copies stay within the toolkit. For tests.
+    /// None: the window asks for paths itself. For tests.
     None,
 }

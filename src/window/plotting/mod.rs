@@ -8,6 +8,6 @@ mod plot;
 #[cfg(test)]
 mod tests;
 
-pub use heat_map::{CellPointed, cells_ui, heat_map_ui};
+pub use heat_map::cells_ui;
 pub use paint::{bounds, colour, measure, paint, to_egui, to_glam};
-pub use plot::{Pointer, plots_ui, titled_plots_ui};
+pub use plot::{plots_ui, titled_plots_ui};

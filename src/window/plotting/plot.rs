@@ -26,15 +26,6 @@ const MIN_GRID: f32 = 8.0;
 /// Points of a stepped line that are closer than this fraction of an axis are merged: a sharp turn would draw a spike.
 const COINCIDENT: f64 = 5e-4;
 
-/// Response of a plot to the pointer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pointer {
-    /// The pointer pans and zooms the plot and shows the tooltip of a point.
-    Moves,
-    /// The points and bars respond to the pointer.
-    Picks,
-}
-
 /// Plot drawn on the screen.
 pub struct DrawnPlot<'a> {
     /// Plot that is drawn.
@@ -82,7 +73,7 @@ impl DrawnPlot<'_> {
 /// Draws a title and the plots.
 pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
     ui.label(RichText::new(title).font(semibold(type_size().title)));
-    plots_ui(ui, title, figure, Pointer::Moves);
+    plots_ui(ui, title, figure);
 }
 
 /// Minimum width of the legend and the notes next to a square plot.
@@ -90,7 +81,7 @@ const NOTES_WIDTH: f32 = space(48);
 
 /// Draws the plots side by side in the remaining space, and the legend and the notes: next to a square plot if there is room,
 /// else above.
-pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
+pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnPlot<'a>> {
     let head_ui = |ui: &mut Ui| {
         legend_ui(ui, figure);
         for note in &figure.notes {
@@ -116,7 +107,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
     };
     let plots = figure.plots.iter().enumerate().map(|(index, plot)| {
         let mut slot = ui.new_child(UiBuilder::new().max_rect(slot(index)));
-        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, pointer);
+        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot);
         let mut drawn = DrawnPlot {
             plot,
             has_pointer: response.contains_pointer(),
@@ -160,7 +151,7 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
 }
 
 /// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window.
-fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
+fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
@@ -174,7 +165,6 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
             .tick_label_color(palette.dim)
             .tick_label_font(FontId::proportional(type_size().small))
     };
-    let may_move = pointer == Pointer::Moves;
     // A menu over the plot is not covered by tooltips.
     let is_covered = Popup::is_any_open(ui.ctx());
     let mut shown = egui_plot::Plot::new(id)
@@ -190,11 +180,8 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
         .show_background(false)
         .grid_color(palette.line)
         .allow_scroll(false)
-        .allow_drag(may_move)
-        .allow_zoom(may_move)
-        .allow_boxed_zoom(may_move)
         .show_crosshair(false)
-        .label_formatter(|position| tooltip_at(plot, position).filter(|_| may_move && !is_covered))
+        .label_formatter(|position| tooltip_at(plot, position).filter(|_| !is_covered))
         .set_margin_fraction(Vec2::ZERO)
         .include_x(*x.start())
         .include_x(*x.end())

@@ -4,9 +4,10 @@ use decoupler_files::figure::SequentialMap;
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
 use super::ViewKind;
+use crate::window::test_view::HeightScale;
 
 /// Something that the user can do by a key, or by picking it from the list of all commands.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Command {
     // Of the Train view.
     Train,
@@ -38,9 +39,7 @@ pub enum Command {
     Dark,
     Light,
     Colours(SequentialMap),
-    LockHeights,
-    FreeHeights,
-    FreeErrors,
+    Scale(&'static str, HeightScale, Option<f64>),
     Larger,
     Smaller,
     UsualSize,
@@ -68,8 +67,16 @@ impl Command {
         let ctrl = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND, key));
         let shift = Modifiers::COMMAND | Modifiers::SHIFT;
         let (name, keys, hint) = match self {
-            Self::Train => ("Train", ctrl(Key::Enter), "Start training a network."),
-            Self::TrainLonger => ("Train longer", None, "Continue from the current weights."),
+            Self::Train => (
+                "Train",
+                ctrl(Key::Enter),
+                "Start training a network from random weights.",
+            ),
+            Self::TrainLonger => (
+                "Train longer",
+                None,
+                "Continue from the current weights with the method and the epochs on the left, counted from here.",
+            ),
             Self::PauseTraining => ("Pause training", ctrl(Key::P), ""),
             Self::ResumeTraining => ("Resume training", ctrl(Key::P), ""),
             Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
@@ -99,9 +106,7 @@ impl Command {
             Self::Dark => ("Dark theme", None, ""),
             Self::Light => ("Light theme", None, ""),
             Self::Colours(map) => (map.name(), None, map.meaning()),
-            Self::LockHeights => ("Lock the scale of heights", None, "The same colours on every surface."),
-            Self::FreeHeights => ("Free the scale of heights", None, "Colours span the displayed heights."),
-            Self::FreeErrors => ("Free the scale of errors", None, "Colours span the displayed errors."),
+            Self::Scale(name, ..) => (*name, None, "Colours of the displayed heights or errors."),
             Self::Larger => ("Larger interface", ctrl(Key::Plus), "Zoom in."),
             Self::Smaller => ("Smaller interface", ctrl(Key::Minus), "Zoom out."),
             Self::UsualSize => ("Reset the interface size", ctrl(Key::Num0), "Zoom to 100 %."),
@@ -124,8 +129,18 @@ impl Command {
     }
 }
 
+impl About {
+    /// Returns the tooltip of its button: "Stop training (Ctrl+.)", with the Command key on macOS.
+    pub fn tooltip(&self, ctx: &Context) -> String {
+        let Self { name, keys, hint } = self;
+        let keys = keys.map_or(String::new(), |keys| format!(" ({})", ctx.format_shortcut(&keys)));
+        let gap = if hint.is_empty() { "" } else { "\n" };
+        format!("{name}{keys}{gap}{hint}")
+    }
+}
+
 /// A command that is listed now.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Offer {
     /// The command.
     pub command: Command,

@@ -29,7 +29,7 @@ use decoupler_files::{
     import::{Recorded, Setup, SetupSets},
 };
 
-use super::Effect;
+use super::{Effect, RunView};
 use crate::window::training_worker::{PastNetworks, RunId, TrainedRun};
 
 /// Something that a view shows and the user can export.
@@ -514,6 +514,14 @@ pub enum NetworkSource {
 }
 
 impl NetworkSource {
+    /// The best network of `run`.
+    pub fn of(run: &RunView) -> Self {
+        match &run.kept {
+            Some((name, file)) => Self::Kept(name.clone(), Arc::clone(file)),
+            None => Self::Training(run.id, Box::new(run.setup.clone())),
+        }
+    }
+
     /// Returns the decoders that can be exported.
     pub fn decoders(&self) -> impl Iterator<Item = BundleDecoder> {
         let has_network = !matches!(self, Self::Samples(..));

@@ -12,7 +12,7 @@ mod run_view;
 mod state;
 mod view;
 
-pub use super::training_worker::{RunResult, RunView};
+pub use super::training_worker::{OpenPlan, RunResult, RunView};
 pub use command::{About, Command, Offer, Offers};
 pub use effect::{Effect, Matter, Notice};
 pub use error_table::error_table_ui;
@@ -25,4 +25,4 @@ pub use offers::{FileInUse, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
 pub use run_view::{run_buttons_ui, sentence, training_status};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
-pub use view::{Columns, Holdings, MIN_WIDTH_FOR_REPORT, Status, Tone, Unfinished, View, ViewKind};
+pub use view::{Holdings, MIN_WIDTH_FOR_REPORT, Status, Tone, Unfinished, View, ViewKind};

@@ -2,12 +2,12 @@
 
 use std::fmt::Debug;
 
-use eframe::egui::{Key, RichText, Ui};
+use eframe::egui::{Align, Key, Layout, RichText, Sense, Ui, Vec2};
 
 use super::{Effect, FileInUse, Offers, Shared, Shown};
 use crate::window::{
     theme::{Theme, space, type_size},
-    widgets::{state_ui, status_progress_ui},
+    widgets::progress_bar_ui,
 };
 
 /// One of the views. It owns its private state and the handles of its threads, reads the shared state, and requests
@@ -36,7 +36,7 @@ pub trait View: Debug {
     /// Shows its column on the left.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
-    /// Shows its column on the right, where [`ViewKind::columns`] has one.
+    /// Shows its column on the right, where [`ViewKind::has_report`] has one.
     fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Shows its middle. Returns the status line at the bottom, or `None` for that of the training.
@@ -80,27 +80,14 @@ impl ViewKind {
         KEYS[self as usize]
     }
 
-    /// Returns its columns in a window of this width in points.
-    pub fn columns(self, window_width: f32) -> Columns {
-        let is_narrow = window_width < MIN_WIDTH_FOR_REPORT;
-        Columns {
-            form_width: space(if self == Self::Train && is_narrow { 62 } else { 68 }),
-            has_report: self == Self::Train && !is_narrow,
-        }
+    /// Returns true if it has a column on the right in a window of this width in points.
+    pub fn has_report(self, window_width: f32) -> bool {
+        self == Self::Train && window_width >= MIN_WIDTH_FOR_REPORT
     }
 }
 
 /// Width of a window, in points, from which a column on the right leaves the middle enough room.
 pub const MIN_WIDTH_FOR_REPORT: f32 = 1400.0;
-
-/// The columns next to the middle of a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Columns {
-    /// Width of the one on the left, in points.
-    pub form_width: f32,
-    /// True if there is a column on the right.
-    pub has_report: bool,
-}
 
 /// Status of a view, shown in the line at the bottom.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,12 +131,18 @@ impl Status {
             Tone::Bad => palette.bad,
         };
         ui.horizontal_centered(|ui| {
-            state_ui(ui, colour, &self.text);
+            ui.spacing_mut().item_spacing.x = space(4);
+            let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
+            ui.painter().circle_filled(dot.center(), 4.0, colour);
+            ui.label(RichText::new(&self.text).size(type_size().note));
             for note in &self.notes {
                 ui.label(RichText::new(note).size(type_size().note).color(palette.dim));
             }
             if let Some((name, share)) = self.progress {
-                status_progress_ui(ui, name, share);
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    ui.set_max_width(space(40).min(ui.available_width()));
+                    progress_bar_ui(ui, name, share, &format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0)));
+                });
             }
         });
     }

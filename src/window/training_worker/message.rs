@@ -10,14 +10,14 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{Coverage, Run, RunError, RunSettings, StartRecord, TestErrors, auto::AutoProgress},
+    evaluation::{Coverage, Run, RunError, RunSettings, StartRecord, TestErrors},
     live::{DriftReference, LiveError},
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::{Progress as Reading, Recorded, Setup},
+    import::{Recorded, Setup},
 };
 use ndarray::Array2;
 
@@ -89,16 +89,25 @@ pub enum Event {
     Unkept(String),
     /// The training continues with these settings, or an error.
     Continued(Result<Box<RunSettings>, String>),
-    /// Progress of reading a recording before a training.
-    Reading(Reading),
-    /// Progress of choosing the settings of a training.
-    Choosing(Box<AutoProgress>),
+    /// Progress of reading a recording or of choosing settings before a training.
+    Preparing(Preparing),
     /// Progress of the training.
     Progressed(Box<Progress>),
     /// The current training has ended: the network file to keep, or the reason why there is none.
     Finished(Result<Box<NetworkFile>, String>),
     /// The thread has ended, with the reason unless it was asked to end.
     Died(Option<JobError>),
+}
+
+/// Progress of the work before a training.
+#[derive(Clone, Debug)]
+pub struct Preparing {
+    /// Name of the work.
+    pub work: &'static str,
+    /// The work in a few words.
+    pub text: String,
+    /// Share that is done, if known.
+    pub share: Option<f32>,
 }
 
 /// Function called on the thread of the worker with a training, or with the reason why it is not available.
@@ -237,14 +246,8 @@ pub struct Worker {
     keeping: Keeping,
     /// The training that is being prepared.
     awaited: Cell<Option<RunId>>,
-    watched: Arc<Watched>,
-}
-
-/// Message of the window to the worker during its work.
-#[derive(Debug, Default)]
-pub(super) struct Watched {
     /// Number of the training last asked for: the preparations of others are cancelled.
-    pub(super) newest: AtomicU64,
+    newest: Arc<AtomicU64>,
 }
 
 impl Worker {
@@ -252,8 +255,8 @@ impl Worker {
     pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
         let mut job = Background::new("training", wake);
-        let (watched, keeping) = (Arc::<Watched>::default(), Keeping::default());
-        let (in_thread, keeps) = (Arc::clone(&watched), keeping.clone());
+        let (newest, keeping) = (Arc::<AtomicU64>::default(), Keeping::default());
+        let (in_thread, keeps) = (Arc::clone(&newest), keeping.clone());
         job.start(
             move |report| TrainingLoop::new(report, &in_thread, keeps).run(&incoming),
             |ended| Event::Died(ended.err()),
@@ -263,7 +266,7 @@ impl Worker {
             job,
             keeping,
             awaited: Cell::default(),
-            watched,
+            newest,
         }
     }
 
@@ -308,7 +311,7 @@ impl Worker {
     pub fn begin(&self, origin: Origin) {
         let id = RunId::new();
         self.awaited.set(Some(id));
-        self.watched.newest.store(id.0, Ordering::Relaxed);
+        self.newest.store(id.0, Ordering::Relaxed);
         self.ask(Request::Begin(id, origin));
     }
 
@@ -316,7 +319,7 @@ impl Worker {
     /// [`Self::next_event`] reports it.
     pub fn ask(&self, request: Request) {
         if matches!(request, Request::Stop) && self.awaited.take().is_some() {
-            self.watched.newest.store(RunId::new().0, Ordering::Relaxed);
+            self.newest.store(RunId::new().0, Ordering::Relaxed);
         }
         // The receiver is dropped only if the worker died.
         let _ = self.requests().send(request);

@@ -3,7 +3,7 @@ use std::{
     path::Path,
     sync::{
         Arc,
-        atomic::Ordering,
+        atomic::{AtomicU64, Ordering},
         mpsc::{Receiver, TryRecvError},
     },
     time::{Duration, Instant},
@@ -14,16 +14,12 @@ use decoupler_core::{
         Intervals, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
         frame_us,
-        recorded::Determination,
     },
     job::Job,
     training::TrainingSettings,
 };
 use decoupler_files::{
-    export::{
-        CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
-        describe_worse_than_ridge,
-    },
+    export::{CheckpointFile, CheckpointPlace, NetworkFile, describe_samples},
     import::{ChoosingProgress, Progress as Reading, Setup, SetupSets},
     machine::system_cause,
 };
@@ -33,8 +29,9 @@ use super::{
     Event, Origin, Progress, Request, RunId, RunResult, RunView, Start, TrainedRun,
     calibration::Calibration,
     keeping::{Keeping, question},
-    message::{Watched, continue_run, furthest_epoch},
+    message::{Preparing, continue_run, furthest_epoch},
     past_networks::PastNetworks,
+    run_view::describe,
 };
 use crate::window::{
     job::Report,
@@ -48,7 +45,8 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 /// State of the thread.
 pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
-    watched: &'a Watched,
+    /// Number of the training last asked for.
+    newest: &'a AtomicU64,
     keeping: Keeping,
     /// Checkpoints of trainings that were cut short; the last is offered first.
     left: Vec<CheckpointPlace>,
@@ -81,10 +79,10 @@ enum Stage {
 }
 
 impl<'a> TrainingLoop<'a> {
-    pub(super) fn new(report: &'a Report<Event>, watched: &'a Watched, keeping: Keeping) -> Self {
+    pub(super) fn new(report: &'a Report<Event>, newest: &'a AtomicU64, keeping: Keeping) -> Self {
         Self {
             report,
-            watched,
+            newest,
             keeping,
             left: Vec::new(),
             current: None,
@@ -206,9 +204,15 @@ impl<'a> TrainingLoop<'a> {
     /// its networks.
     fn prepare(&self, id: RunId, origin: Origin) -> Result<(TrainedRun, RunView), String> {
         let report = self.report;
-        let is_cancelled = || self.watched.newest.load(Ordering::Relaxed) != id.0 || report.is_cancelled();
+        let is_cancelled = || self.newest.load(Ordering::Relaxed) != id.0 || report.is_cancelled();
         let job = Job::new(&is_cancelled);
-        let mut on_reading = |progress: Reading| report.progress(Event::Reading(progress), |_, _| ());
+        let on_work = |work, text, share| {
+            report.progress(Event::Preparing(Preparing { work, text, share }), |_, _| ());
+        };
+        let mut on_reading = |Reading { bytes, of }: Reading| {
+            let share = of.map(|of| bytes as f32 / of.max(1) as f32);
+            on_work("Reading", "Reading the recording".to_owned(), share);
+        };
         let here = Path::new("");
         let mut asked = None;
         let mut draw = |setup: &Setup, states| -> Result<TrainedRun, TestViewError> {
@@ -222,7 +226,7 @@ impl<'a> TrainingLoop<'a> {
                 let mut on_choosing = |progress| match progress {
                     ChoosingProgress::Reading(progress) => on_reading(progress),
                     ChoosingProgress::Trying(progress) => {
-                        report.progress(Event::Choosing(Box::new(progress)), |_, _| ());
+                        on_work("Choosing settings", progress.text, Some(progress.share as f32));
                     }
                 };
                 let fixed = AutoFixed::default();
@@ -428,20 +432,16 @@ impl Training {
         let Some(recorded) = &self.trained.recorded else {
             return Vec::new();
         };
-        let (targets, has_combined) = (&run.problem().targets, run.combined().is_some());
-        let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
         let mut remarks = self.trained.of_samples.clone();
-        remarks.extend(describe_determinacy(targets, &determined, has_combined));
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),
-                network_alone: has_combined.then(|| errors.clone()),
+                network_alone: run.combined().map(|_| errors.clone()),
                 baselines: baselines.clone(),
-                coverage: Vec::new(),
+                coverage: run.coverage().to_vec(),
             };
-            remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
+            remarks.extend(describe(run.problem(), run.test(), answers, &scores, recorded.plan.division.by));
         }
-        remarks.extend(describe_coverage(targets, run.coverage()));
         remarks.extend(self.no_intervals.clone());
         remarks
     }

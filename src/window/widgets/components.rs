@@ -1,20 +1,13 @@
 //! Components that egui lacks, each accessible by its label, and the reason why text typed into a field was refused.
 
 use eframe::egui::{
-    Align, Button, CollapsingHeader, Color32, DragValue, FontId, Frame, Id, Key, KeyboardShortcut, Label, Layout,
-    Margin, Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, UiBuilder,
-    Vec2, Widget, WidgetInfo, WidgetText,
+    Align, Button, CollapsingHeader, Color32, DragValue, FontId, Frame, Id, Key, Label, Layout, Margin, ProgressBar,
+    Rect, Response, RichText, ScrollArea, Stroke, StrokeKind, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
     accesskit::{Invalid, Role},
     vec2,
 };
 
 use crate::window::theme::{Theme, radius, semibold, space, type_size};
-
-/// Returns the tooltip of an action with its shortcut: "Pauses the training (Ctrl+P).", with the Command key on macOS.
-pub fn with_shortcut(ui: &Ui, text: &str, key: Key) -> String {
-    let shortcut = KeyboardShortcut::new(Modifiers::COMMAND, key);
-    format!("{text} ({}).", ui.ctx().format_shortcut(&shortcut))
-}
 
 /// Heading of a section, in small capitals: "SENSOR ARRAY".
 pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {
@@ -69,8 +62,8 @@ pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
     });
 }
 
-/// Primary button, at least as large as `min_size`.
-pub fn primary_button_of(text: impl Into<String>, min_size: Vec2) -> impl Widget {
+/// Primary button.
+pub fn primary_button(text: impl Into<String>) -> impl Widget {
     let text = RichText::new(text).font(semibold(type_size().body));
     move |ui: &mut Ui| {
         let palette = Theme::of(ui).palette;
@@ -81,15 +74,10 @@ pub fn primary_button_of(text: impl Into<String>, min_size: Vec2) -> impl Widget
             widgets.active.weak_bg_fill = palette.accent_hovered;
             // On the accent colour, a ring of the same colour would be invisible.
             widgets.active.bg_stroke.color = palette.text;
-            ui.add(Button::new(text.color(palette.on_accent)).min_size(min_size))
+            ui.add(Button::new(text.color(palette.on_accent)).min_size(vec2(0.0, space(7))))
         };
         ui.scope(coloured).inner
     }
-}
-
-/// Primary button.
-pub fn primary_button(text: impl Into<String>) -> impl Widget {
-    primary_button_of(text, vec2(0.0, space(7)))
 }
 
 /// Button as high as [`primary_button`], in the colour of controls.
@@ -155,12 +143,7 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
                         .frame_when_inactive(true)
                         .corner_radius(radius() - 1)
                         .min_size(vec2(min_width, space(6)));
-                    let mut response = ui.add(button);
-                    if !meaning.is_empty() {
-                        response = response.on_hover_text(meaning);
-                    }
-                    let clicked = response.clicked();
-                    if clicked && !is_selected {
+                    if hinted(ui.add(button), meaning).clicked() && !is_selected {
                         picked = Some(option);
                     }
                 }
@@ -171,41 +154,29 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
     picked
 }
 
+/// Adds a tooltip; nothing if it is empty.
+pub fn hinted(response: Response, hint: &str) -> Response {
+    match hint {
+        "" => response,
+        _ => response.on_hover_text(hint),
+    }
+}
+
 /// Shows tabs, with the selected one underlined. Returns the tab that the user has just selected.
 pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)], selected: T) -> Option<T> {
     let palette = Theme::of(ui).palette;
     let mut picked = None;
     let response = ui
-        .horizontal(|ui| {
-            // As wide as when selected, so that no tab moves; closer to each other if there is little room.
-            let width = |text: &str| {
-                let galley = ui
-                    .painter()
-                    .layout_no_wrap(text.to_owned(), semibold(type_size().body), palette.text);
-                galley.size().x
-            };
-            let widths: Vec<f32> = tabs.iter().map(|(_, text)| width(text)).collect();
-            let spare = ui.available_width() - widths.iter().sum::<f32>();
-            let padding = (0.5 * spare / tabs.len() as f32)
-                .floor()
-                .clamp(0.5 * space(1), space(2) + 2.0);
+        .horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 0.0;
-            ui.spacing_mut().button_padding.x = padding;
-            for (&(tab, text), width) in tabs.iter().zip(widths) {
+            for &(tab, text) in tabs {
                 let is_selected = tab == selected;
                 let colour = if is_selected { palette.text } else { palette.dim };
-                let mut shown = RichText::new(text).color(colour);
-                if is_selected {
-                    shown = shown.font(semibold(type_size().body));
-                }
-                let button = Button::new(shown)
-                    .fill(Color32::TRANSPARENT)
-                    .stroke(Stroke::NONE)
-                    .min_size(vec2(width + 2.0 * padding, 0.0));
-                let tab_response = ui.add(button);
+                let button = Button::new(RichText::new(text).color(colour)).fill(Color32::TRANSPARENT);
+                let tab_response = ui.add(button.stroke(Stroke::NONE));
                 tab_response.widget_info(|| WidgetInfo::selected(Role::Tab, true, is_selected, text));
                 if is_selected || tab_response.hovered() {
-                    let line = tab_response.rect.x_range().shrink(padding);
+                    let line = tab_response.rect.x_range().shrink(space(2));
                     let colour = if is_selected { palette.accent } else { palette.line };
                     let below = tab_response.rect.bottom() + 1.0;
                     ui.painter().hline(line, below, Stroke::new(2.0, colour));
@@ -243,14 +214,6 @@ pub fn dim_ui(ui: &mut Ui, text: &str) -> Response {
     ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
-/// Shows a state after a dot of its colour, with a space to whatever follows in the line.
-pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
-    ui.spacing_mut().item_spacing.x = space(4);
-    let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
-    ui.painter().circle_filled(dot.center(), 4.0, colour);
-    ui.label(RichText::new(text).size(type_size().note));
-}
-
 /// Shows a progress bar over the available width: `name` is the name of the work, `text` is shown inside the bar.
 pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32, text: &str) -> Response {
     let palette = &Theme::of(ui).palette;
@@ -273,14 +236,6 @@ pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32, text: &str) -> Respo
         info
     });
     response
-}
-
-/// Shows the progress of work in percent at the right end of a status line.
-pub fn status_progress_ui(ui: &mut Ui, name: &str, share: f32) {
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        ui.set_max_width(space(40).min(ui.available_width()));
-        progress_bar_ui(ui, name, share, &format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0)));
-    });
 }
 
 /// Shows a sentence in the middle of an empty card: the reason why it is empty, and what to do.

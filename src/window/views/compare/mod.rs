@@ -16,10 +16,10 @@ use self::{
 };
 use crate::window::{
     job::Wake,
-    plotting::{Pointer, plots_ui, titled_plots_ui},
+    plotting::{plots_ui, titled_plots_ui},
     shared::{
-        Effect, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, Status, View, surface_cards_ui, surface_ui,
-        target_choice_ui, view_mode_ui,
+        Effect, NetworkSource, PLACES, RightCard, RunList, RunsRequest, Shared, Shown, Status, View, surface_cards_ui,
+        surface_ui, target_choice_ui, view_mode_ui,
     },
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
@@ -127,7 +127,11 @@ impl CompareView {
             let others = ids.filter(|id| !pinned.contains(&Some(*id)));
             let mut newest = Vec::from_iter(others.take(empty.clone().count()));
             newest.reverse();
-            effects.extend(empty.zip(newest).map(|(place, id)| Effect::PinRun(place, Some(id))));
+            effects.extend(
+                empty
+                    .zip(newest)
+                    .map(|(place, id)| Effect::ChangeRuns(RunsRequest::Pin(place, Some(id)))),
+            );
         }
         self.seen = count;
     }
@@ -207,7 +211,7 @@ impl CompareView {
                 let targets = &compared.test.problem.targets;
                 target_choice_ui(ui, "Target", &format!("target of {letter}"), targets, &mut side.target);
                 if let Some(chart) = &chart {
-                    plots_ui(ui, &format!("Regression of {letter}"), chart, Pointer::Moves);
+                    plots_ui(ui, &format!("Regression of {letter}"), chart);
                 }
             }
             (Some(Err(reason)), None) => {

@@ -1,9 +1,6 @@
 use decoupler_core::{
-    evaluation::{
-        RunError,
-        experiments::{Axis, AxisKind},
-    },
-    settings::{Kind, SettingError, Value},
+    evaluation::experiments::{Axis, AxisKind},
+    settings::{Kind, SettingError},
 };
 use eframe::egui::{TextEdit, Ui, vec2};
 
@@ -49,31 +46,6 @@ impl ValueList {
             (SettingError::Text(_, message), _) => format!("{name}: {message}; write a list such as {example}"),
             _ => error.to_string(),
         })
-    }
-
-    /// Returns the numbers, at least one.
-    ///
-    /// # Errors
-    /// If the list is empty, or a value cannot be parsed.
-    pub fn numbers(&self) -> Result<Vec<f64>, String> {
-        let values = self.parse()?.values;
-        if values.is_empty() {
-            return Err(RunError::NoValues(self.kind.name()).to_string());
-        }
-        let numbers = values.iter().map(|value| match value {
-            Value::Integer(value) => *value as f64,
-            Value::Number(value) => *value,
-            Value::Text(_) => f64::NAN,
-        });
-        let numbers = Vec::from_iter(numbers);
-        let range = self.kind.setting().range().unwrap_or(f64::MIN..=f64::MAX);
-        match numbers.iter().find(|number| !range.contains(number)) {
-            Some(number) => {
-                let (name, [min, max]) = (self.kind.name(), [range.start(), range.end()]);
-                Err(format!("{name}: {number} is not possible, give from {min} to {max}"))
-            }
-            None => Ok(numbers),
-        }
     }
 
     /// Shows the list as a text field, named after its setting unless `name` is given.
@@ -133,13 +105,6 @@ mod tests {
         assert_eq!(
             list(AxisKind::Hidden, " 6;8\n10,,12 ").parse(),
             Ok(Axis::integers(AxisKind::Hidden, [6, 8, 10, 12]))
-        );
-        assert_eq!(list(AxisKind::Noise, "0, 1e-3").numbers(), Ok(vec![0.0, 1e-3]));
-        assert!(
-            list(AxisKind::Hidden, "")
-                .numbers()
-                .unwrap_err()
-                .contains("no values for hidden nodes")
         );
         let cases = [
             (

@@ -14,7 +14,7 @@ use super::{
     view::TrainView,
 };
 use crate::window::{
-    plotting::{Pointer, cells_ui, plots_ui},
+    plotting::{cells_ui, plots_ui},
     shared::{Command, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
     theme::{Theme, space},
     widgets::{placeholder_ui, tabs_ui},
@@ -263,7 +263,7 @@ impl Chart {
             Figure::Surfaces(_) => return,
         };
         // Each chart is zoomed by itself.
-        let drawn = plots_ui(ui, self.name, plots, Pointer::Moves);
+        let drawn = plots_ui(ui, self.name, plots);
         let Some(plot) = drawn.iter().find(|plot| plot.has_pointer) else {
             return;
         };

@@ -81,6 +81,7 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     });
     shown.push(Shown::table("Decoder table", stem("decoders"), decoders));
     let standing = run.and_then(|run| match shared.phase {
+        _ if run.kept.is_some() => Err("A run of the list cannot be continued: train again.".to_owned()),
         Phase::Paused | Phase::Calibrating | Phase::Ended(_) => Ok(checkpoint_task(run)),
         _ => Err("A training under way cannot be saved: pause it first.".to_owned()),
     });
@@ -98,17 +99,16 @@ fn networks<'a>(
         Ok(trained) => *trained,
         Err(reason) => return Shown::network("Best network", Err(reason.clone()), Vec::new()).into(),
     };
-    let setup = Box::new(run.setup.clone());
     let mut shown = Vec::new();
     if let Some(epoch) = past {
-        let source = NetworkSource::Past(run.id, setup.clone(), epoch, run.past.clone());
+        let setup = Box::new(run.setup.clone());
+        let source = NetworkSource::Past(run.id, setup, epoch, run.past.clone());
         let name = format!("Displayed network, epoch {epoch}");
         // The decoders were measured together with the best network.
         shown.extend(Shown::network(&name, Ok(source), Vec::new()));
     }
     let name = format!("Best network, epoch {}", latest.best_epoch);
-    let source = NetworkSource::Training(run.id, setup);
-    shown.extend(Shown::network(&name, Ok(source), measured(view)));
+    shown.extend(Shown::network(&name, Ok(NetworkSource::of(run)), measured(view)));
     shown
 }
 

@@ -83,7 +83,7 @@ fn errors_ui(
         }
     }
     let model_based = run.baselines.model_based.as_ref().and_then(TestErrors::nodes);
-    let source = { view.decoders.is_open }.then(|| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
+    let source = { view.decoders.is_open }.then(|| NetworkSource::of(run));
     let (decoders, target) = (&mut view.decoders, &mut view.target);
     let measured = (&*run.problem, model_based);
     let asked = decoders_ui(ui, decoders, measured, target, source.as_ref());
