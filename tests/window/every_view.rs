@@ -101,8 +101,8 @@ fn every_view_is_named_described_and_whole() {
                         .into_iter()
                         .map(|text| without_digits(&format!("{place}: {text}")));
                     faults.extend(cuts.filter(|cut| !KNOWN_CUTS.lines().any(|known| known == cut)));
-                    if zoom_percent == 100.0 {
-                        take_pictures(driver, &format!("{view}-{}-{}x{}", name_of(source), size.x, size.y));
+                    if zoom_percent == 100.0 || view.starts_with("Live") {
+                        take_pictures(driver, &format!("{view}-{}-{}x{}-{zoom_percent}", name_of(source), size.x, size.y));
                     }
                 }
             }
@@ -116,7 +116,7 @@ fn every_view_is_named_described_and_whole() {
 /// Decodes some frames of the source.
 fn decode(driver: &mut Driver, source: SourceKind, folder: &Path) {
     if source == SourceKind::Recording {
-        driver.type_into("File", &folder.join("probe.csv").display().to_string());
+        driver.type_into("File to replay", &folder.join("probe.csv").display().to_string());
         driver.settle();
     }
     driver.click("▶ Start");

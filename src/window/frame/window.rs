@@ -17,7 +17,9 @@ use crate::{
     window::{
         job::{Background, Wake},
         preview::PreviewEvent,
-        shared::{Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
+        shared::{
+            Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status,
+        },
         theme::{self, Theme, space},
         training_worker::{Request, Worker},
         views::Views,

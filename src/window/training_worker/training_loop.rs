@@ -440,7 +440,13 @@ impl Training {
                 baselines: baselines.clone(),
                 coverage: run.coverage().to_vec(),
             };
-            remarks.extend(describe(run.problem(), run.test(), answers, &scores, recorded.plan.division.by));
+            remarks.extend(describe(
+                run.problem(),
+                run.test(),
+                answers,
+                &scores,
+                recorded.plan.division.by,
+            ));
         }
         remarks.extend(self.no_intervals.clone());
         remarks

@@ -84,7 +84,10 @@ fn buttons_ui(ui: &mut Ui, shared: &Shared, run: &KeptRun, removing: &mut Option
     let can_open = !shared.phase.is_busy();
     let open = ui.add_enabled(can_open, Button::new("Open").min_size(size));
     open.widget_info(|| WidgetInfo::labeled(Role::Button, can_open, format!("Open {name}")));
-    if open.on_hover_text("Shows it in the Train view, with its settings.").clicked() {
+    if open
+        .on_hover_text("Shows it in the Train view, with its settings.")
+        .clicked()
+    {
         effects.push(Effect::OpenRun(run.id));
     }
     let remove = ui.add(Button::new("Remove…").min_size(size));

@@ -23,7 +23,7 @@ use crate::window::{
     },
 };
 
-/// Shows the answers above, the readings or values and the figures below, and the replay bar at the bottom.
+/// Shows the surfaces, the readings or values, the figures, and the replay bar at the bottom.
 pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let whole = ui.available_rect_before_wrap();
     let Some(answer) = view.shown.answer.clone() else {
@@ -38,30 +38,51 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         card_ui(ui, bar, |ui| replay_bar_ui(ui, view, shared, effects));
         cards = rest.with_max_y(rest.bottom() - gap);
     }
-    let lower_height = (0.46 * cards.height()).clamp(space(60), space(100));
-    let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
-    let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
-    let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-    let mut upper = upper.with_max_y(upper.bottom() - gap);
-    let left = left.with_max_x(left.right() - gap);
-    if let Some(readings) = &answer.readings {
-        let readings = readings.clone().coloured(shared.look.colours);
-        card_ui(ui, left, |ui| readings_ui(ui, &readings, &answer.faulty));
+    let below = |rect: Rect| {
+        let height = (0.46 * rect.height()).clamp(space(45), space(100));
+        let (upper, lower) = rect.split_top_bottom_at_y(rect.bottom() - height);
+        (upper.with_max_y(upper.bottom() - gap), lower)
+    };
+    let beside = |rect: Rect| {
+        let width = (0.42 * rect.width()).clamp(space(75), space(110));
+        let (left, right) = rect.split_left_right_at_x(rect.right() - width);
+        (left.with_max_x(left.right() - gap), right)
+    };
+    // In a narrow window, the readings are left out.
+    let is_narrow = cards.width() < space(130);
+    let has_chart = answer.chart.is_some();
+    let (main, rest) = if has_chart && !is_narrow {
+        beside(cards)
+    } else {
+        below(cards)
+    };
+    let (surfaces, values, figures) = match has_chart {
+        true if answer.surfaces.is_empty() => (Rect::NOTHING, main, rest),
+        true => {
+            let (surfaces, chart) = below(main);
+            (surfaces, chart, rest)
+        }
+        false if is_narrow => (main, Rect::NOTHING, rest),
+        false => {
+            let (readings, figures) = beside(rest);
+            (main, readings, figures)
+        }
+    };
+    if !answer.surfaces.is_empty() {
+        surfaces_ui(ui, surfaces, view, shared.look, effects);
     }
     if let Some(chart) = &answer.chart {
-        let (surface, beside) = upper.split_left_right_at_x(upper.center().x);
-        let place = if answer.surfaces.is_empty() { upper } else { beside };
         let title = match answer.network.intervals {
             Some(_) => "Decoded values with their 90 % intervals",
             None => "Decoded values",
         };
-        card_ui(ui, place, |ui| titled_plots_ui(ui, title, chart));
-        let values_ui = |ui: &mut Ui| values_ui(ui, &answer);
-        card_ui(ui, left, |ui| scrolled_ui(ui, "live targets", values_ui));
-        upper = surface;
+        card_ui(ui, values, |ui| titled_plots_ui(ui, title, chart));
     }
-    surfaces_ui(ui, upper, view, shared.look, effects);
-    card_ui(ui, right, |ui| {
+    if let Some(readings) = answer.readings.as_ref().filter(|_| values.is_positive()) {
+        let readings = readings.clone().coloured(shared.look.colours);
+        card_ui(ui, values, |ui| readings_ui(ui, &readings, &answer.faulty));
+    }
+    card_ui(ui, figures, |ui| {
         scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, &answer, shared, effects));
     });
     ui.allocate_rect(whole, Sense::hover());
@@ -177,7 +198,7 @@ fn invitation(view: &LiveView, shared: &Shared) -> String {
             None => format!("Waiting for the first frame from {}.", running.source_text()),
         };
     }
-    let Some((name, file)) = view.network(shared) else {
+    let Some((name, _)) = view.network(shared) else {
         return match shared.phase.is_busy() {
             true => "A network is being trained: it can be used here as soon as it is finished.".to_owned(),
             false => "Live decoding needs a trained network. Training one takes seconds to minutes.".to_owned(),
@@ -189,8 +210,7 @@ fn invitation(view: &LiveView, shared: &Shared) -> String {
             "Start shows an indenter that wanders over a simulated array, decoded by the network '{name}'. To decode your own \
              readings, choose a replay, a serial port or a TCP address on the left."
         ),
-        Ok(_) if file.problem.sensor.is_some() => format!("The network '{name}' decodes frames as they arrive."),
-        Ok(_) => format!("The network '{name}' decodes samples as they arrive, by the names of their columns."),
+        Ok(_) => format!("Start decodes it with the network '{name}'."),
     }
 }
 
@@ -228,6 +248,9 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
     if let Some((_, consequence)) = &answer.fault {
         note_ui(ui, consequence);
     }
+    if answer.chart.is_some() {
+        values_ui(ui, answer);
+    }
     section_heading_ui(ui, "Confidence");
     let palette = Theme::of(ui).palette;
     for fact in &answer.confidence {
@@ -248,7 +271,7 @@ fn stream_ui(ui: &mut Ui, counts: &Tally) {
     let hint = "Time from reading a frame to its answer: median and 99th percentile.";
     let quantile = |share| counts.latencies.quantile(share);
     let [median, high] = [0.5, 0.99].map(|share| quantile(share).map_or_else(|| format_number(None), format_duration));
-    fact_ui(ui, "Latency", hint, &format!("p50 {median}, p99 {high}"));
+    fact_ui(ui, "Latency", hint, &format!("median {median}, 99 % within {high}"));
     fact_ui(ui, "Decoded", "Frames since the start.", &counts.decoded.to_string());
     let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
     fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
@@ -285,8 +308,13 @@ fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
         return;
     };
     section_heading_ui(ui, "Recording");
-    let length = format!("{}, {:.1} s", counted(recorded.frames, "frame"), recorded.seconds);
-    dim_ui(ui, &format!("Recorded {length}.")).on_hover_text(recorded.path.display().to_string());
+    let name = recorded.path.file_name().unwrap_or_default().display();
+    let text = format!(
+        "Recorded {}, {:.1} s: {name}",
+        counted(recorded.frames, "frame"),
+        recorded.seconds
+    );
+    dim_ui(ui, &text).on_hover_text(recorded.path.display().to_string());
     let replay = ui.add_enabled(recorded.frames > 0, ghost_button("Replay recording"));
     let hint = "Replays it with the network on the left. Export saves a copy of it.";
     if replay.on_hover_text(hint).clicked() {

@@ -15,6 +15,7 @@ use decoupler_core::{
     job::Job,
     live::{DriftMonitor, FaultEvent, FaultyWire, ZeroGains},
     problem::Problem,
+    scene::Indenter,
     surface::SurfaceMap,
     text::{capitalised, counted},
 };
@@ -243,6 +244,8 @@ pub struct Screen {
     noise: f64,
     nodes: Arc<[String]>,
     surfaces: Surfaces,
+    /// Largest drop of a reading under a full press in the middle.
+    full_press_percent: Option<f64>,
 }
 
 /// Returns the surfaces of the last answer.
@@ -298,6 +301,7 @@ impl Screen {
             noise: plan.noise.relative,
             nodes,
             surfaces,
+            full_press_percent: None,
         }
     }
 
@@ -324,8 +328,8 @@ impl Screen {
         }
     }
 
-    fn answered(&self, session: &Session) -> Answered {
-        let (last, problem) = (&session.last, &self.network.problem);
+    fn answered(&mut self, session: &Session) -> Answered {
+        let last = &session.last;
         let mut answered = Answered {
             network: Arc::clone(&self.network),
             time_s: last.time_s,
@@ -342,6 +346,7 @@ impl Screen {
         let Some(array) = &session.array else {
             let history = session.history.until(last.time_s);
             let intervals = self.network.intervals.as_ref();
+            let problem = &self.network.problem;
             answered.chart = Some(targets_over_time_figure(&problem.targets, &history, intervals));
             let outside = outside(session, problem.feature_count(), "target");
             answered.confidence = vec![outside, self.drift(session)];
@@ -368,15 +373,21 @@ impl Screen {
         answered
     }
 
-    /// Returns the map of the readings. Its colours span the drops of the training, so that they mean the same in every frame.
-    fn readings(&self, array: &LiveArray, frame_ohm: &[f64]) -> HeatMap {
-        let lowest_ohm = (0..array.rows.len()).flat_map(|row| {
-            let inputs = self.network.network.at(row).inputs();
-            let lowest_ohm = |column| inputs.range().map_or(0.0, |range| range.extremes(column).0);
-            (0..inputs.channels()).map(lowest_ohm)
+    /// Returns the map of the readings. Its colours span the drops under a full press in the middle, so that they mean the same
+    /// in every frame.
+    fn readings(&mut self, array: &LiveArray, frame_ohm: &[f64]) -> HeatMap {
+        let largest_percent = *self.full_press_percent.get_or_insert_with(|| {
+            let (sensor, rows) = (&array.sensor, &array.rows);
+            let scene = self.network.problem.sensor.as_ref().map(|simulation| simulation.scene);
+            let depth_mm = scene.unwrap_or_default().stroke_mm(&sensor.geometry);
+            let (row, node) = (rows[rows.len() / 2], sensor.scale.nodes_per_row() / 2);
+            let place_mm = sensor.geometry.row_node_mm(sensor.scale, row, node).truncate();
+            let pressed = Indenter::default().press(sensor, place_mm, depth_mm);
+            let of_row = |row: &usize| sensor.row_resistances(*row, pressed.row_mm(*row));
+            let pressed_ohm: Result<Vec<_>, _> = rows.iter().map(of_row).collect();
+            let drops_percent = pressed_ohm.map(|ohm| array.drops_percent(&ohm.concat()));
+            drops_percent.map_or(100.0, |drops| drops.into_iter().fold(0.1, f64::max))
         });
-        let drops_percent = array.drops_percent(&Vec::from_iter(lowest_ohm));
-        let largest_percent = drops_percent.into_iter().fold(0.5, f64::max);
         readings_figure(array.drops_percent(frame_ohm), &array.rows, largest_percent)
     }
 

@@ -121,7 +121,7 @@ impl SourceForm {
                 quantity_ui(ui, "Frames per second", hint, rate, 0.1..=10_000.0, "Hz");
             }
             SourceKind::Replay => {
-                text_ui(ui, "File", FRAMES.description, &mut self.path);
+                text_ui(ui, "File to replay", FRAMES.description, &mut self.path);
                 // The field shows only the beginning of a long path.
                 let path = Path::new(self.path.trim());
                 if let (Some(name), true) = (path.file_name(), path.is_absolute()) {

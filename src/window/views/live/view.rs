@@ -379,8 +379,9 @@ impl View for LiveView {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let count = if self.has_sensor(shared) { 4 } else { 2 };
-        for command in &COMMANDS[..count] {
+        let primary = &COMMANDS[usize::from(self.running.is_none())];
+        let others = if self.has_sensor(shared) { &COMMANDS[2..4] } else { &[] };
+        for command in std::iter::once(primary).chain(others) {
             command_ui(ui, command, self, shared, effects);
         }
     }
