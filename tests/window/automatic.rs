@@ -13,10 +13,10 @@ use decoupler_core::{evaluation::RunSettings, training::StoppingRules};
 const CHOSEN: [(&str, Option<&str>); 6] = [
     ("Hidden nodes", None),
     ("Method", None),
-    ("Scaling", Some("Network inputs")),
-    ("Epochs", Some("When to stop")),
-    ("Restarts", Some("Method settings")),
-    ("Combine restarts", Some("Method settings")),
+    ("Scaling", Some("Advanced")),
+    ("Epochs", Some("Advanced")),
+    ("Restarts", Some("Advanced")),
+    ("Combine restarts", Some("Advanced")),
 ];
 
 fn unfold(driver: &mut Driver) {
@@ -118,13 +118,13 @@ fn one_network_per_row_wire_is_set_by_hand() {
     }
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.mean("row", "row-wire");
-    driver.unfold_to("Network inputs", "Scaling");
+    driver.unfold_to("Advanced", "Scaling");
     assert!(driver.is_enabled("Choose settings automatically"));
     driver.click_button("Known");
     driver.settle();
     assert!(!driver.is_enabled("Choose settings automatically"));
     assert!(driver.is_enabled("Hidden nodes") && driver.is_enabled("Method"));
-    driver.unfold_to("When to stop", "Epochs");
+    driver.unfold_to("Advanced", "Epochs");
     driver.enter("Epochs", "3");
     driver.click("▶ Train");
     driver.wait_for_training();

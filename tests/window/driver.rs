@@ -32,14 +32,7 @@ use crate::rasterise::Rasteriser;
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Parts of the configuration that are folded away at first.
-const FOLDED: [&str; 6] = [
-    "Scene",
-    "Samples",
-    "Geometry",
-    "Network inputs",
-    "When to stop",
-    "Method settings",
-];
+const FOLDED: [&str; 3] = ["Scene", "Samples", "Advanced"];
 
 /// Label of the button that closes a notice.
 const DISMISS: &str = "Dismiss";
@@ -149,7 +142,7 @@ impl Driver {
 
     /// Chooses the paper's scene and waits for its surface.
     pub(crate) fn choose_papers_scene(&mut self) {
-        self.click("Paper's scene");
+        self.click("Paper");
         self.get("Hidden nodes").scroll_to_me();
         self.wait("the paper's surface", |driver| {
             let preview = driver.state().preview.as_ref();
@@ -537,7 +530,7 @@ impl Driver {
 
     /// Configures a small network on the smallest array of the paper, which is trained quickly.
     pub(crate) fn configure_small(&mut self) {
-        self.click("Paper's scene");
+        self.click("Paper");
         self.click("10×6");
         self.enter("Hidden nodes", "6");
         self.enter("Training samples", "200");

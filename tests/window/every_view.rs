@@ -102,7 +102,10 @@ fn every_view_is_named_described_and_whole() {
                         .map(|text| without_digits(&format!("{place}: {text}")));
                     faults.extend(cuts.filter(|cut| !KNOWN_CUTS.lines().any(|known| known == cut)));
                     if zoom_percent == 100.0 || view.starts_with("Live") {
-                        take_pictures(driver, &format!("{view}-{}-{}x{}-{zoom_percent}", name_of(source), size.x, size.y));
+                        take_pictures(
+                            driver,
+                            &format!("{view}-{}-{}x{}-{zoom_percent}", name_of(source), size.x, size.y),
+                        );
                     }
                 }
             }

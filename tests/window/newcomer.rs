@@ -49,11 +49,11 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
     assert!(at_rest > 40 && deepest_mm > 0.2, "{at_rest} at rest, {deepest_mm} mm");
 
-    driver.click("Paper's scene");
+    driver.click("Paper");
     assert_eq!(driver.state().draft, RunSettings::default());
     driver.wait("the published errors", |driver| driver.has("Published"));
     shows_the_baselines_of(&driver, RunSettings::default());
-    driver.click("Indenter's print");
+    driver.click("Press demo");
     assert_eq!(driver.state().draft, opened);
 }
 
@@ -184,7 +184,7 @@ fn empty_views_fill_on_a_click() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.click_button("Compare");
-    assert!(driver.is_enabled("Train a network now"));
+    assert!(driver.says("Every finished training is kept here"));
     driver.click_button("Study");
     driver.settle();
     assert!(driver.is_enabled("▶ Run"));

@@ -181,6 +181,11 @@ fn the_other_decoders_answer_alongside_the_network() {
     driver.train();
     driver.wait_for_last_epoch();
     driver.act(PRESS);
+    driver.wait("the mean's answer", |driver| {
+        driver.says("Training mean, worst mm: 0.") && driver.says("Network, worst mm: 0.")
+    });
+    assert!(!driver.says("Newton, "), "folded until asked for");
+    driver.click("Other decoders");
     driver.wait("Newton's answer", |driver| {
         driver
             .texts()

@@ -8,9 +8,7 @@ use decoupler_files::{
         surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
     },
 };
-use eframe::egui::{
-    Align, Button, ComboBox, CursorIcon, Layout, Popup, Rect, Sense, Ui, UiBuilder, WidgetInfo, accesskit::Role, vec2,
-};
+use eframe::egui::{Align, Button, ComboBox, CursorIcon, Layout, Popup, Rect, Sense, Ui, UiBuilder, vec2};
 
 use super::Effect;
 use crate::window::{
@@ -206,39 +204,37 @@ fn colours_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
     }
 }
 
-/// The choice between a locked and a free scale, where there is one; changes `look`.
+/// The check box that locks the scale, where there is one; changes `look`.
 fn lock_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
     let limit_mm = *scale.range.end();
-    let keeps = format!("Keeps ± {} mm for whatever is shown next.", format_number(limit_mm));
-    let meanings = match scale.quantity {
-        Quantity::Height => [
-            "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.",
-            "Spans the displayed heights: small differences are visible, but colours are not comparable between plots.",
-        ],
-        Quantity::Target(_) => [
-            "Spans the values of all test samples: colours mean the same for every sample.",
-            "Spans the displayed values: small differences are visible, but colours are not comparable between plots.",
-        ],
-        Quantity::Error => [&*keeps, "Spans ± the largest displayed error."],
+    let hint = match scale.quantity {
+        Quantity::Height => {
+            "Locked, it spans the whole stroke, from full compression to rest: colours mean the same on every surface. \
+             Free, it spans the displayed heights."
+        }
+        Quantity::Target(_) => {
+            "Locked, it spans the values of all test samples: colours mean the same for every sample. Free, it spans the \
+             displayed values."
+        }
+        Quantity::Error => &format!(
+            "Locked, it keeps ± {} mm for whatever is shown next. Free, it spans ± the largest displayed error.",
+            format_number(limit_mm)
+        ),
         // The limit of errors is in millimetres, which these are not.
         Quantity::Pattern | Quantity::Sensitivity | Quantity::TargetError(_) => return,
     };
-    let is_locked = match scale.quantity {
-        Quantity::Error => look.error_limit_mm.is_some(),
-        _ => look.heights == HeightScale::Stroke,
+    let is_error = scale.quantity == Quantity::Error;
+    let mut is_locked = match is_error {
+        true => look.error_limit_mm.is_some(),
+        false => look.heights == HeightScale::Stroke,
     };
     section_heading_ui(ui, "Scale");
-    for ((locks, text), meaning) in [(true, "Locked"), (false, "Free")].into_iter().zip(meanings) {
-        let button = Button::selectable(locks == is_locked, text).min_size(vec2(space(24), space(6)));
-        let button = ui.add(button);
-        button.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, locks == is_locked, text));
-        if button.clicked() {
-            match (&scale.quantity, locks) {
-                (Quantity::Error, _) => look.error_limit_mm = locks.then_some(limit_mm),
-                (_, true) => look.heights = HeightScale::Stroke,
-                (_, false) => look.heights = HeightScale::Fitted,
-            }
+    if ui.checkbox(&mut is_locked, "Locked").changed() {
+        match (is_error, is_locked) {
+            (true, _) => look.error_limit_mm = is_locked.then_some(limit_mm),
+            (false, true) => look.heights = HeightScale::Stroke,
+            (false, false) => look.heights = HeightScale::Fitted,
         }
-        dim_ui(ui, meaning);
     }
+    dim_ui(ui, hint);
 }

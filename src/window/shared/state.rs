@@ -3,7 +3,7 @@ use std::sync::Arc;
 use decoupler_core::{
     dataset::Simulation,
     evaluation::{Baselines, RunSettings},
-    scene::{Indenter, Loading, RowModel, Scene},
+    scene::{Indenter, Loading, Noise, RowModel, Scene},
     training::{StopReason, TrainingSettings},
 };
 use decoupler_files::{
@@ -262,18 +262,14 @@ impl Shared {
 }
 
 /// Settings with which the window opens for the first time: the paper's experiment, but with a ball pressed somewhere
-/// onto the surface, which is easily recognised as touch, instead of independently pressed nodes.
+/// onto the surface, which is easily recognised as touch, instead of independently pressed nodes, and readings with noise.
 pub fn opening_settings() -> RunSettings {
     RunSettings::from(Simulation {
-        scene: opening_scene(),
+        scene: Scene {
+            loading: Loading::Indenter(Indenter::default()),
+            noise: Noise::relative(1e-3),
+            ..Scene::default()
+        },
         ..Simulation::default()
     })
-}
-
-/// The scene with which the window opens for the first time.
-pub fn opening_scene() -> Scene {
-    Scene {
-        loading: Loading::Indenter(Indenter::default()),
-        ..Scene::default()
-    }
 }

@@ -10,7 +10,7 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{Coverage, Run, RunError, RunSettings, StartRecord, TestErrors},
+    evaluation::{Coverage, Intervals, Run, RunError, RunSettings, StartRecord, TestErrors},
     live::{DriftReference, LiveError},
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
@@ -28,6 +28,7 @@ use super::{
 use crate::window::{
     job::{Background, JobError, Wake},
     test_view::TestCharts,
+    timeline::Timeline,
 };
 
 /// Request from the window to the worker.
@@ -119,6 +120,8 @@ pub struct TrainedRun {
     pub run: Run,
     /// Origin of recorded samples; `None` for a simulated array.
     pub recorded: Option<Recorded>,
+    /// Places of the test samples of a recording on an axis of time.
+    pub timeline: Option<Arc<Timeline>>,
     /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
     pub drift: Result<DriftReference, LiveError>,
     /// Remarks on the samples of a recording.
@@ -189,6 +192,8 @@ pub struct RunResult {
     pub network_alone: Option<TestErrors>,
     /// Coverage of the intervals on the test set, if they were calibrated.
     pub coverage: Vec<Option<Coverage>>,
+    /// Intervals of the decoded values, if they were calibrated.
+    pub intervals: Option<Intervals>,
     /// Epoch of the network.
     pub best_epoch: usize,
     /// Problem of the training, when it has ended.

@@ -3,7 +3,7 @@ use std::{ops::Deref, sync::Arc, time::Duration};
 use decoupler_core::{
     dataset::{Dataset, SplitBy},
     evaluation::{
-        Baselines, ErrorTable, PublishedErrors, Run, RunSettings, Scores, StartRecord, auto::AutoRecord, frame_us,
+        Baselines, ErrorTable, PublishedErrors, RunSettings, Scores, StartRecord, auto::AutoRecord, frame_us,
         recorded::Determination,
     },
     problem::Problem,
@@ -12,13 +12,13 @@ use decoupler_core::{
 use decoupler_files::{
     export::{NetworkFile, describe_coverage, describe_determinacy, describe_worse_than_ridge},
     figure::EpochOutline,
-    import::{Plan, Recorded, Setup},
+    import::{Plan, Setup},
 };
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    message::{Progress, RunId, RunResult, append_epochs},
+    message::{Progress, RunId, RunResult, TrainedRun, append_epochs},
     past_networks::PastNetworks,
 };
 use crate::window::test_view::{TestView, TestViewError};
@@ -107,17 +107,14 @@ impl RunView {
     ///
     /// # Errors
     /// If its test set cannot be drawn.
-    pub fn begun(
-        id: RunId,
-        run: &Run,
-        recorded: Option<&Recorded>,
-        asked: Option<Setup>,
-    ) -> Result<Self, TestViewError> {
+    pub fn begun(id: RunId, trained: &TrainedRun, asked: Option<Setup>) -> Result<Self, TestViewError> {
+        let (run, recorded) = (&trained.run, trained.recorded.as_ref());
         let plan = recorded.map(|recorded| recorded.plan.clone());
         let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
         let setup = Setup::of(*run.settings(), plan).expect("a recorded run has its plan");
         let baselines = run.baselines().cloned();
-        let test = TestView::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)?;
+        let mut test = TestView::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)?;
+        test.timeline = trained.timeline.clone().unwrap_or(test.timeline);
         let baselines = baselines.expect("the baselines of a whole run are measured");
         Ok(Self {
             id,
@@ -151,6 +148,7 @@ impl RunView {
             errors: scores.network.clone(),
             network_alone: scores.network_alone.clone(),
             coverage: scores.coverage.clone(),
+            intervals: file.intervals.clone(),
             best_epoch: training.best_epoch,
             defect: None,
             epochs_run: training.epochs,

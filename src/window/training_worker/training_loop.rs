@@ -36,6 +36,7 @@ use super::{
 use crate::window::{
     job::Report,
     test_view::{TestView, TestViewError},
+    timeline::Timeline,
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
@@ -242,8 +243,7 @@ impl<'a> TrainingLoop<'a> {
                 restored(left.path(), &job, &mut on_reading)?
             }
         };
-        let began =
-            RunView::begun(id, &trained.run, trained.recorded.as_ref(), asked).map_err(|error| error.to_string())?;
+        let began = RunView::begun(id, &trained, asked).map_err(|error| error.to_string())?;
         job.check().map_err(|error| error.to_string())?;
         Ok((trained, began))
     }
@@ -408,6 +408,7 @@ impl Training {
                 errors,
                 network_alone,
                 coverage: run.coverage().to_vec(),
+                intervals: run.intervals().cloned(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),
@@ -470,12 +471,14 @@ fn restored(path: &Path, job: &Job<'_>, on_reading: &mut dyn FnMut(Reading)) -> 
 
 impl TrainedRun {
     fn new(run: Run, sets: &SetupSets) -> Self {
+        let recordings = sets.recordings.as_ref();
         Self {
-            run,
             recorded: sets.recorded().cloned(),
+            timeline: recordings.map(|recordings| Arc::new(Timeline::of(recordings, run.settings().seed))),
             drift: sets.drift_reference(),
             of_samples: describe_samples(sets),
             calibration: Calibration::of(sets),
+            run,
         }
     }
 

@@ -111,23 +111,36 @@ pub fn list_ui<T: Copy + PartialEq>(
     options: &[(T, &str, &str)],
     selected: T,
 ) -> Option<T> {
-    let shown = options.iter().find(|(option, ..)| *option == selected);
     let mut picked = None;
     field_ui(ui, name, hint, |ui| {
-        let combo = ComboBox::from_id_salt(name)
-            .selected_text(shown.map_or("", |(_, text, _)| *text))
-            .width(space(31));
-        let combo = combo.show_ui(ui, |ui| {
-            for &(option, text, meaning) in options {
-                let choice = hinted(ui.selectable_label(option == selected, text), meaning);
-                if choice.clicked() && option != selected {
-                    picked = Some(option);
-                }
-            }
-        });
-        combo.response
+        combo_ui(ui, name, space(31), options, selected, &mut picked)
     });
     picked
+}
+
+/// Drop-down list of this width without its name; a newly selected option is `picked`.
+pub fn combo_ui<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    name: &str,
+    width: f32,
+    options: &[(T, &str, &str)],
+    selected: T,
+    picked: &mut Option<T>,
+) -> Response {
+    let shown = options.iter().find(|(option, ..)| *option == selected);
+    let combo = ComboBox::from_id_salt(name)
+        .selected_text(shown.map_or("", |(_, text, _)| *text))
+        .width(width)
+        .height(space(90));
+    let combo = combo.show_ui(ui, |ui| {
+        for &(option, text, meaning) in options {
+            let choice = hinted(ui.selectable_label(option == selected, text), meaning);
+            if choice.clicked() && option != selected {
+                *picked = Some(option);
+            }
+        }
+    });
+    combo.response
 }
 
 /// Slider `width` points wide. On a double click, the caller should reset the value to its default.

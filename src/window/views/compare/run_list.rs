@@ -11,7 +11,7 @@ use super::figures::named_settings;
 use crate::window::{
     shared::{Effect, PLACES, RunsRequest, Shared},
     theme::{space, type_size},
-    widgets::{dim_ui, ghost_button, scrolled_ui, section_heading_ui},
+    widgets::{dim_ui, scrolled_ui, section_heading_ui},
 };
 
 /// Shows the finished trainings, newest first; `removing` is the run whose removal awaits confirmation.
@@ -20,12 +20,10 @@ pub(super) fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u6
     scrolled_ui(ui, "runs", |ui| {
         section_heading_ui(ui, "Runs");
         if runs.workspace.runs.is_empty() {
-            dim_ui(ui, "Every finished training is kept here, with its network.");
-            ui.add_space(space(2));
-            let can_train = !shared.phase.is_busy();
-            if ui.add_enabled(can_train, ghost_button("Train a network now")).clicked() {
-                effects.extend([Effect::ShowTraining, Effect::Train]);
-            }
+            dim_ui(
+                ui,
+                "Every finished training is kept here, with its network: press Train in the Train view.",
+            );
         } else {
             dim_ui(ui, "Choose one as A and one as B to see them side by side.");
         }

@@ -13,8 +13,8 @@ use eframe::egui::{Align, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo}
 
 use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
-    plotting::{cells_ui, titled_plots_ui},
-    shared::{Command, Effect, Look, Shared, surface_cards_ui, surface_ui, view_mode_ui},
+    plotting::{SeriesView, cells_ui},
+    shared::{Command, Effect, Look, Shared, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui},
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
@@ -50,7 +50,8 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
     };
     // In a narrow window, the readings are left out.
     let is_narrow = cards.width() < space(130);
-    let has_chart = answer.chart.is_some();
+    let series = answer.series();
+    let has_chart = series.is_some();
     let (main, rest) = if has_chart && !is_narrow {
         beside(cards)
     } else {
@@ -71,12 +72,14 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
     if !answer.surfaces.is_empty() {
         surfaces_ui(ui, surfaces, view, shared.look, effects);
     }
-    if let Some(chart) = &answer.chart {
-        let title = match answer.network.intervals {
-            Some(_) => "Decoded values with their 90 % intervals",
-            None => "Decoded values",
-        };
-        card_ui(ui, values, |ui| titled_plots_ui(ui, title, chart));
+    if let Some(series) = &series {
+        card_ui(ui, values, |ui| {
+            if series.targets.len() > SeriesView::tracks(ui) {
+                target_choice_ui(ui, "From target", "live target", series.targets, &mut view.series.first);
+            }
+            let name = |sample| format!("{} s", format_number(series.places[sample]));
+            view.series.show(ui, "Decoded values", series, None, name);
+        });
     }
     if let Some(readings) = answer.readings.as_ref().filter(|_| values.is_positive()) {
         let readings = readings.clone().coloured(shared.look.colours);
@@ -248,7 +251,7 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
     if let Some((_, consequence)) = &answer.fault {
         note_ui(ui, consequence);
     }
-    if answer.chart.is_some() {
+    if answer.over_time.is_some() {
         values_ui(ui, answer);
     }
     section_heading_ui(ui, "Confidence");

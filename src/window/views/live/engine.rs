@@ -22,9 +22,8 @@ use decoupler_core::{
 use decoupler_files::{
     export::{NetworkFile, format_number, format_percent},
     figure::{
-        HeatMap, PlotFigure, TargetSurface, readings_figure,
+        HeatMap, PlotAxis, TargetSurface, TimeSeries, readings_figure,
         surface::{Quantity, Surface},
-        targets_over_time_figure,
     },
     live::{
         History, Input, Keeping, LiveArray, Note, Recorded, ReplayState, Session, SessionError, SessionEvent,
@@ -32,8 +31,9 @@ use decoupler_files::{
     },
 };
 use glam::DVec3;
+use ndarray::Array2;
 
-use crate::window::{glossary, job::Report};
+use crate::window::{glossary, job::Report, timeline};
 
 /// Message to the thread.
 pub enum Request {
@@ -61,6 +61,8 @@ pub enum LiveEvent {
 const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 /// Time between attempts to connect to a lost device or socket again.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
+/// Longest time in seconds between lines of a stream that is no gap.
+const LONGEST_BURST_S: f64 = 1.0;
 /// Maximum wait for a command while the source is paused.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
@@ -199,14 +201,30 @@ pub struct Answered {
     pub readings: Option<HeatMap>,
     /// Rows and columns of the readings whose wires are faulty, from 0.
     pub faulty: [Vec<usize>; 2],
-    /// The values of a network of a recording over time.
-    pub chart: Option<PlotFigure>,
+    /// Of a network of a recording: times from the start in seconds, first samples after gaps, and samples × targets.
+    pub over_time: Option<(Vec<f64>, Vec<usize>, Array2<f64>)>,
     /// All of them: of a recording, from its beginning.
     pub history: History,
     /// How far the answer can be trusted.
     pub confidence: Vec<Fact>,
     /// The current fault of the wires, and its consequence.
     pub fault: Option<(String, String)>,
+}
+
+impl Answered {
+    /// Returns the values of a network of a recording over time.
+    pub fn series(&self) -> Option<TimeSeries<'_>> {
+        let (places, gaps, decoded) = self.over_time.as_ref()?;
+        Some(TimeSeries {
+            targets: &self.network.problem.targets,
+            axis: PlotAxis::linear("time (s)"),
+            places,
+            gaps,
+            decoded: decoded.view(),
+            actual: None,
+            intervals: self.network.intervals.as_ref(),
+        })
+    }
 }
 
 /// A figure with its name and meaning.
@@ -338,16 +356,26 @@ impl Screen {
             nodes: Arc::clone(&self.nodes),
             readings: None,
             faulty: Default::default(),
-            chart: None,
+            over_time: None,
             history: session.history.clone(),
             confidence: Vec::new(),
             fault: None,
         };
         let Some(array) = &session.array else {
             let history = session.history.until(last.time_s);
-            let intervals = self.network.intervals.as_ref();
+            // Times of a recording begin at 0 s, too.
+            let (start_s, is_stream) = match &session.input {
+                Input::Replay(replay) => (last.time_s - replay.state.at_s, false),
+                _ => (0.0, true),
+            };
+            let places = Vec::from_iter(history.iter().map(|(time_s, _)| time_s - start_s));
+            let mut gaps = timeline::gaps(&places);
+            // Lines of a stream arrive in bursts.
+            gaps.retain(|&gap| !is_stream || places[gap] - places[gap - 1] > LONGEST_BURST_S);
             let problem = &self.network.problem;
-            answered.chart = Some(targets_over_time_figure(&problem.targets, &history, intervals));
+            let shape = (places.len(), problem.targets.len());
+            let decoded = Array2::from_shape_fn(shape, |(sample, target)| history[sample].1[target]);
+            answered.over_time = Some((places, gaps, decoded));
             let outside = outside(session, problem.feature_count(), "target");
             answered.confidence = vec![outside, self.drift(session)];
             return answered;

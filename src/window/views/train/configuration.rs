@@ -2,11 +2,10 @@
 //! in the order of the pipeline.
 
 use decoupler_core::{
-    dataset::Simulation,
-    evaluation::{Outlook, RunSettings, TrainingSize, auto::AutoRecord},
+    evaluation::{Outlook, TrainingSize, auto::AutoRecord},
     scene::RowModel,
 };
-use eframe::egui::{Button, Ui};
+use eframe::egui::Ui;
 
 use super::recording::RecordingEditor;
 use crate::window::{
@@ -40,7 +39,6 @@ pub fn configuration_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &S
             fields.set_by = SetBy::Choice(shared.chosen_run().map(|run| run.settings()));
         }
         settings_ui(ui, &mut fields, recording, shared, effects);
-        reset_ui(ui, &mut settings, shared);
         ui.add_space(space(4));
     });
     forms::follow_preset(&before, &mut settings);
@@ -62,10 +60,13 @@ fn settings_ui(
 ) {
     let (is_recording, phase) = (shared.source == SourceKind::Recording, shared.phase);
     let (is_new, is_open) = (!phase.is_busy(), !phase.is_busy() || phase == Phase::Paused);
-    ui.add_enabled_ui(is_new, |ui| match fields.settings.simulation_mut() {
-        Some(simulation) => forms::array_ui(ui, simulation),
-        None => recording.files_ui(ui, shared, effects),
+    ui.add_enabled_ui(is_new, |ui| match is_recording {
+        true => recording.files_ui(ui, shared, effects),
+        false => forms::preset_ui(ui, fields.settings),
     });
+    if let Some(simulation) = fields.settings.simulation_mut() {
+        ui.add_enabled_ui(is_new, |ui| forms::array_ui(ui, simulation));
+    }
     if is_recording {
         recording.columns_button_ui(ui, shared);
         ui.add_space(space(2));
@@ -95,27 +96,24 @@ fn settings_ui(
         } else {
             array_ui(ui, fields, shared.skin().and_then(|skin| skin.outlook.as_ref()));
         }
-        fold_ui(ui, "Network inputs", &fields.summary(forms::of_inputs), |ui| {
-            forms::inputs_ui(ui, fields, is_recording && recording.has_row_wires(), size);
-        });
     });
-    ui.add_enabled_ui(is_open, |ui| forms::training_ui(ui, fields, is_new));
+    let has_recorded_rows = is_recording && recording.has_row_wires();
+    ui.add_enabled_ui(is_open, |ui| {
+        forms::advanced_ui(ui, fields, is_new, has_recorded_rows, size);
+    });
 }
 
-/// Presets, scene, samples and geometry of a simulated array.
+/// Scene and samples of a simulated array.
 fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
-    forms::preset_ui(ui, fields.settings);
-    let Some(simulation) = fields.settings.simulation_mut() else {
+    let Some(&simulation) = fields.settings.simulation() else {
         return;
     };
-    forms::scene_choice_ui(ui, &mut simulation.scene);
     ui.add_space(space(2));
     ui.separator();
     // They stay visible while the scene is folded away.
     for warning in outlook.iter().flat_map(|outlook| &outlook.warnings) {
         note_ui(ui, &capitalised(&format!("{warning}.")));
     }
-    let simulation = *simulation;
     fold_ui(ui, "Scene", &forms::of_scene(&simulation.scene), |ui| {
         forms::scene_ui(ui, fields);
         forms::size_ui(ui, &simulation, outlook);
@@ -123,10 +121,6 @@ fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
     fold_ui(ui, "Samples", &forms::of_samples(fields.settings), |ui| {
         fields.show(ui, &forms::SAMPLES);
     });
-    if let Some(Simulation { sensor, .. }) = fields.settings.simulation_mut() {
-        let geometry = forms::of_geometry(&sensor.geometry);
-        fold_ui(ui, "Geometry", &geometry, |ui| forms::geometry_ui(ui, sensor));
-    }
 }
 
 /// The check box that leaves the settings of a recording to a choice by cross-validation, and what is known about it.
@@ -136,7 +130,7 @@ fn automatic_choice_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) 
     let reason = if has_one_network {
         "The training must end first."
     } else {
-        "Settings are chosen for one network for all row-wires: choose it under “Network inputs”, Rows."
+        "Settings are chosen for one network for all row-wires: choose it under “Advanced”, Rows."
     };
     ui.add_enabled_ui(has_one_network && !shared.phase.is_busy(), |ui| {
         let choice = ui.checkbox(&mut is_automatic, "Choose settings automatically");
@@ -155,27 +149,5 @@ fn automatic_choice_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) 
             }
         };
         dim_ui(ui, &note);
-    }
-}
-
-/// The button that brings the usual settings of the source back.
-fn reset_ui(ui: &mut Ui, settings: &mut RunSettings, shared: &Shared) {
-    let (text, hint, usual) = match shared.source {
-        SourceKind::Array => (
-            "Reset to the paper's settings",
-            "10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples",
-            RunSettings::default(),
-        ),
-        SourceKind::Recording => (
-            "Reset to the default settings",
-            "Bayesian regularisation for recordings, 12 hidden nodes, 300 epochs",
-            RunSettings::measured(RowModel::Shared),
-        ),
-    };
-    ui.add_space(space(4));
-    let can_reset = !shared.phase.is_busy() && *settings != usual;
-    let reset = ui.add_enabled(can_reset, Button::new(text));
-    if reset.on_hover_text(hint).clicked() {
-        *settings = usual;
     }
 }

@@ -1,14 +1,10 @@
 //! What the Train view shows of the current training, for export.
 
 use decoupler_core::evaluation::DecoderReport;
-use decoupler_files::{
-    export::{decoder_table, error_table, loss_table},
-    figure::surface::ViewMode,
-};
+use decoupler_files::export::{decoder_table, error_table, loss_table};
 
 use super::{
-    charts::shown_chart,
-    surfaces::{through, upper_figure},
+    charts::{SURFACES, lower_chart, upper_chart},
     view::TrainView,
 };
 use crate::window::{
@@ -47,23 +43,20 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     };
     let past = view.scrub.result().map(|past| past.epochs_run);
     let mut shown = networks(view, &trained, past);
-    let (name, what) = match shared.look.mode {
-        _ if shared.source == SourceKind::Recording && through(shared).is_none() => ("Sample", "sample"),
-        ViewMode::ThreeD => ("Surfaces", "surfaces"),
-        ViewMode::Top => ("Surfaces", "surfaces-top"),
+    let upper = match shared.source {
+        SourceKind::Array => &SURFACES,
+        SourceKind::Recording => upper_chart(view, shared),
     };
-    let surfaces = run.clone().map(|_| || upper_figure(view, shared));
-    shown.push(Shown::figure(name, stem(what), surfaces));
-    let (chart, figure) = shown_chart(view, shared);
-    let figure = run.clone().and_then(|_| {
-        let figure = figure.ok_or("This chart has nothing to show yet.")?;
-        Ok(move || figure.clone())
-    });
-    shown.push(Shown::figure(
-        "Chart",
-        stem(&chart.to_lowercase().replace(' ', "-")),
-        figure,
-    ));
+    let lower = lower_chart(view, shared);
+    for (name, chart) in [(upper.name, upper), ("Chart", lower)] {
+        let figure = run.clone().and_then(|_| {
+            let figure = chart.figure(view, shared);
+            let figure = figure.ok_or("This chart has nothing to show yet.")?;
+            Ok(move || figure.clone())
+        });
+        let stem = stem(&chart.name.to_lowercase().replace(' ', "-"));
+        shown.push(Shown::figure(name, stem, figure));
+    }
     let errors = trained.map(|(run, latest)| {
         let result = view.result(shared).unwrap_or(latest);
         move || error_table(&run.error_table(result))

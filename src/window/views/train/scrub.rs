@@ -146,6 +146,7 @@ fn result_at(
         charts: Arc::new(test.charts(&answers)),
         remarks: Vec::new(),
         coverage: Vec::new(),
+        intervals: None,
         best_epoch: past.best_epoch,
         defect: None,
         epochs_run: epoch,

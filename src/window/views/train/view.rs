@@ -5,7 +5,7 @@ use eframe::egui::{Sense, Ui};
 use ndarray::Array2;
 
 use super::{
-    charts::{charts_card_ui, readings_of_view_ui},
+    charts::{answers_ui, charts_card_ui, readings_of_view_ui},
     configuration::configuration_ui,
     decoders::Decoders,
     exports::shown,
@@ -18,6 +18,7 @@ use super::{
 };
 use crate::window::{
     job::Wake,
+    plotting::SeriesView,
     shared::{
         Command, Effect, Holdings, MIN_WIDTH_FOR_REPORT, Offers, Phase, RightCard, RunResult, Shared, Shown,
         SourceKind, Status, Unfinished, View, run_buttons_ui,
@@ -30,7 +31,7 @@ use crate::window::{
 impl View for TrainView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
-        self.decoders.follow(shared);
+        self.decoders.follow_training(shared);
         self.scrub.follow(shared, effects);
     }
 
@@ -161,8 +162,11 @@ pub struct TrainView {
     pub(super) target: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
-    /// Name of the chart below.
+    /// Name of the chart below, and of that of the answers for a recording.
     pub tab: &'static str,
+    pub(super) upper: &'static str,
+    /// The part of the values over time in view.
+    pub(super) series: SeriesView,
     /// Item lit by the pointer, in every picture.
     pub lights: Lighting,
     /// The wire along which the surfaces are cut.
@@ -189,6 +193,8 @@ impl TrainView {
             target: 0,
             right: RightCard::default(),
             tab: "Loss",
+            upper: "",
+            series: SeriesView::default(),
             lights: Lighting::default(),
             section: SectionChoice::default(),
             has_error_bars: false,
@@ -196,7 +202,7 @@ impl TrainView {
             press: PressState::new(&wake),
             scrub: ScrubState::new(Arc::clone(&wake)),
             recording: RecordingEditor::new(&wake),
-            decoders: Decoders::new(wake),
+            decoders: Decoders::new(wake, &[]),
         }
     }
 
@@ -213,8 +219,12 @@ impl TrainView {
         };
         let lower_height = (share * whole.height()).clamp(least, space(75));
         let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-        surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), self, shared, effects);
+        let upper = upper.with_max_y(upper.max.y - gap);
         let has_sensor = shared.source == SourceKind::Array;
+        match has_sensor {
+            true => surfaces_ui(ui, upper, self, shared, effects),
+            false => answers_ui(ui, upper, self, shared, effects),
+        }
         let width = match is_narrow {
             true => (0.45 * lower.width()).clamp(space(82), space(96)),
             false => (0.4 * lower.width()).floor(),

@@ -1,25 +1,29 @@
 //! Pressing: the user's finger on the actual surface, and the answers of all decoders.
 //!
 //! `pointer` turns mouse and keys into a [`Touch`] before anything of the frame is drawn. `solving` computes what is shown of
-//! it in the background, the newest first; `decoders` asks the other decoders, and trains a small network that answers until
-//! there is another. `section` shows the answers.
+//! it in the background, the newest first; `demo` trains a small network that answers until there is another. `section` shows
+//! the answers.
 
-mod decoders;
+mod demo;
 mod pointer;
 mod section;
 mod solving;
 
 use std::sync::Arc;
 
-use decoupler_core::scene::{Indenter, IndenterShape, Radii};
+use decoupler_core::{
+    decoupling::DecoderKind,
+    scene::{Indenter, IndenterShape, Radii},
+};
 use decoupler_files::figure::surface::{Sight, Surface};
 use eframe::egui::{Id, Rect};
 use glam::DVec2;
 
 use self::{
-    decoders::{Comparison, Demo},
-    solving::{Question, Subject, solve},
+    demo::Demo,
+    solving::{Question, solve},
 };
+use super::decoders::{Decoders, Subject};
 use crate::window::{
     job::{Background, JobError, Wake},
     shared::{RunResult, Shared},
@@ -45,7 +49,7 @@ pub struct PressState {
     /// The latest answer, or why there is none, with its question.
     answered: Option<Answered>,
     solving: Background<Result<Answered, JobError>>,
-    comparison: Comparison,
+    decoders: Decoders,
     demo: Demo,
 }
 
@@ -62,7 +66,7 @@ impl PressState {
             target: None,
             answered: None,
             solving: Background::prompt("press", Arc::clone(wake)),
-            comparison: Comparison::new(wake),
+            decoders: Decoders::new(Arc::clone(wake), &[DecoderKind::Mean]),
             demo: Demo::new(wake),
         }
     }
@@ -121,17 +125,19 @@ impl PressState {
         let Some(place_mm) = self.place_mm else { return };
         let own = shared.shown_run().zip(result).map(|(run, result)| Subject {
             networks: Arc::clone(&result.networks),
-            settings: *run.settings(),
-            is_demo: false,
-            is_idle: result.is_idle,
+            setup: run.setup.clone(),
+            problem: Arc::clone(&run.problem),
         });
         if own.is_none() {
-            self.demo.follow(skin);
+            let scene = shared.draft.simulation().map(|simulation| simulation.scene);
+            self.demo.follow(skin, scene.unwrap_or_default().noise);
         }
         let question = Question {
             finger: self.finger,
             place_mm,
             skin: Arc::clone(skin),
+            is_demo: own.is_none(),
+            is_idle: own.is_none() || result.is_some_and(|result| result.is_idle),
             subject: own.or_else(|| self.demo.subject.clone()?.ok()),
         };
         while let Some(answered) = self.solving.next_event() {
@@ -145,8 +151,21 @@ impl PressState {
         if !is_answered && !self.solving.is_under_way() {
             self.solving.start(move |_| solve(question), |answered| answered);
         }
-        if let Some((question, Ok(shown))) = &self.answered {
-            self.comparison.follow(question, &shown.pressed);
+        if let Some((
+            Question {
+                subject: Some(subject),
+                is_idle,
+                ..
+            },
+            Ok(shown),
+        )) = &self.answered
+        {
+            match is_idle {
+                true => self
+                    .decoders
+                    .follow(&subject.networks, &shown.pressed, || subject.clone()),
+                false => self.decoders.forget(),
+            }
         }
     }
 

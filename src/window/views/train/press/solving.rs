@@ -1,34 +1,21 @@
 //! The pressed sensor, and its answer by the network.
 
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::sync::Arc;
 
 use decoupler_core::{
     dataset::Dataset,
-    decoupling::{Decoder, decode_set},
-    evaluation::{Errors, RunSettings},
+    decoupling::{DecodeError, decode_set},
+    evaluation::{Errors, frame_us},
     network::Networks,
 };
 use glam::DVec2;
 use ndarray::Array2;
 
 use super::Finger;
-use crate::window::test_view::{Drawing, Skin};
-
-/// The network that decodes the touch.
-#[derive(Clone, Debug)]
-pub(super) struct Subject {
-    /// The network, or one for each row.
-    pub(super) networks: Arc<Networks>,
-    /// Settings that it was trained with.
-    pub(super) settings: RunSettings,
-    /// True for the built-in one.
-    pub(super) is_demo: bool,
-    /// True once it no longer changes.
-    pub(super) is_idle: bool,
-}
+use crate::window::{
+    test_view::{Drawing, Skin},
+    views::train::decoders::Subject,
+};
 
 /// Everything that a touch and the network's answer depend on.
 #[derive(Clone, Debug)]
@@ -36,7 +23,12 @@ pub(super) struct Question {
     pub(super) finger: Finger,
     pub(super) place_mm: DVec2,
     pub(super) skin: Arc<Skin>,
+    /// The network that decodes it.
     pub(super) subject: Option<Subject>,
+    /// True for the built-in one.
+    pub(super) is_demo: bool,
+    /// True once the network no longer changes.
+    pub(super) is_idle: bool,
 }
 
 impl Question {
@@ -51,9 +43,9 @@ impl Question {
         (self.skin.sensor, self.skin.stroke_mm) == (skin.sensor, skin.stroke_mm) && self.skin.rows == skin.rows
     }
 
-    fn key(&self) -> (Finger, DVec2, Option<*const Networks>) {
+    fn key(&self) -> (Finger, DVec2, Option<*const Networks>, bool) {
         let networks = self.subject.as_ref().map(|subject| Arc::as_ptr(&subject.networks));
-        (self.finger, self.place_mm, networks)
+        (self.finger, self.place_mm, networks, self.is_idle)
     }
 }
 
@@ -72,24 +64,24 @@ pub struct Shown {
     pub(super) outside: usize,
 }
 
-/// Answer of a decoder to a pressed sensor.
+/// Answer of the network to a pressed sensor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Answer {
     pub(super) errors: Errors,
-    /// Time to decode the frame: the shortest of several, since other load on the machine can only increase it.
-    pub(super) time: Duration,
+    /// Time to decode the frame, in microseconds.
+    pub(super) frame_us: f64,
 }
 
 /// Presses, reads and decodes.
 pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
     let shown = press(&question).map(|pressed| {
         let networks = question.subject.as_ref().map(|subject| &*subject.networks);
-        let decoded = networks.map(|networks| decode(&mut networks.decoder(), &pressed, question.skin.stroke_mm));
+        let decoded = networks.map(|networks| decode(networks, &pressed, question.skin.stroke_mm));
         let answers = decoded.as_ref().and_then(|decoded| decoded.as_ref().ok());
         Shown {
             drawing: question.skin.drawing(&pressed, answers.map(|(answers, _)| answers), 0),
             drops_percent: question.skin.drops_percent(&pressed, 0),
-            answer: decoded.map(|decoded| decoded.map(|(_, answer)| answer)),
+            answer: decoded.map(|decoded| decoded.map(|(_, answer)| answer).map_err(|error| error.to_string())),
             outside: networks.map_or(0, |networks| outside(networks, &pressed)),
             pressed,
         }
@@ -124,29 +116,12 @@ fn press(question: &Question) -> Result<Arc<Dataset>, String> {
 }
 
 /// Decodes a pressed sensor; the answers are rows read × 3·M2.
-pub(super) fn decode(
-    decoder: &mut dyn Decoder,
-    pressed: &Dataset,
-    stroke_mm: f64,
-) -> Result<(Array2<f64>, Answer), String> {
-    /// Number of repeats.
-    const REPEATS: usize = 4;
-    /// Maximum time spent on the repeats.
-    const LONGEST: Duration = Duration::from_millis(30);
-    let mut timed = || {
-        let begun = Instant::now();
-        let answers = decode_set(decoder, pressed).map_err(|error| error.to_string())?;
-        Ok::<_, String>((answers, begun.elapsed()))
-    };
-    let begun = Instant::now();
-    let (answers, mut time) = timed()?;
-    for _ in 0..REPEATS {
-        if begun.elapsed() < LONGEST {
-            time = time.min(timed()?.1);
-        }
-    }
+fn decode(networks: &Networks, pressed: &Dataset, stroke_mm: f64) -> Result<(Array2<f64>, Answer), DecodeError> {
+    let mut decoder = networks.decoder();
+    let answers = decode_set(&mut decoder, pressed)?;
     let errors = Errors::measure(pressed, &answers, stroke_mm);
-    Ok((answers, Answer { errors, time }))
+    let frame_us = frame_us(&mut decoder, pressed)?;
+    Ok((answers, Answer { errors, frame_us }))
 }
 
 /// Number of readings outside the range that the networks were trained in.
