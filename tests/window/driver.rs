@@ -93,7 +93,9 @@ impl Driver {
     pub(crate) fn open_again(file: &Path, runs: &Path) -> Self {
         let (file, runs) = (WindowFile::read(file.to_owned()), runs.to_owned());
         let keeping = |window: DecouplerWindow| window.keeping_runs(runs);
-        Self::open_as(vec2(1440.0, 900.0), Some(file), keeping).on_the_papers_scene()
+        let mut driver = Self::open_as(vec2(1440.0, 900.0), Some(file), keeping);
+        driver.unfold();
+        driver
     }
 
     fn open_as(

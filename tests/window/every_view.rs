@@ -166,6 +166,9 @@ fn unnamed(driver: &mut Driver) -> Vec<String> {
 /// Returns the visible texts that reach past the side of what they are drawn in, or past the window.
 fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
     let screen = driver.harness().ctx.content_rect();
+    let tables = driver.harness().query_all(By::new().role(Role::Table));
+    // Tables scroll to the side.
+    let tables = Vec::from_iter(tables.map(|table| table.rect().expand(2.0)));
     let mut cuts = BTreeSet::new();
     for ClippedShape { clip_rect, shape, .. } in &driver.harness().output().shapes {
         each_text(shape, &mut |text| {
@@ -174,7 +177,8 @@ fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
             let is_visible = parent.intersects(place) && !text.galley.text().trim().is_empty();
             // Rounding to pixels is no cut; what a scroll bar hides above and below comes into sight.
             let is_cut = place.left() < parent.left() - 1.5 || place.right() > parent.right() + 1.5;
-            if is_visible && is_cut && text.angle == 0.0 {
+            let is_in_table = tables.iter().any(|table| table.contains_rect(place.intersect(parent)));
+            if is_visible && is_cut && !is_in_table && text.angle == 0.0 {
                 cuts.insert(text.galley.text().to_owned());
             }
         });

@@ -82,6 +82,7 @@ fn nouns_after_one_are_singular() {
     );
     driver.enter("Hidden nodes", "1");
     driver.wait("the array", |driver| driver.says("1 unknown, 1 equation per frame"));
+    driver.act("Chart: Readings");
     driver.wait("its readings", |driver| driver.says("1 row-wire × 1 column-wire"));
     let texts = driver.texts();
     let plural = |text: &&String| {

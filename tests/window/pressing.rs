@@ -102,6 +102,9 @@ fn wait_for_press(driver: &mut Driver, run: &Run, place_mm: DVec2, depth_mm: f64
     let (low, high) = z.fold((f64::MAX, f64::MIN), |(low, high), (_, z)| (low.min(*z), high.max(*z)));
     let heights = driver.get(DECODED).value();
     assert_eq!(heights, Some(format!("z {low:.2} to {high:.2} mm")));
+    if !driver.has(READINGS) {
+        driver.act("Chart: Readings");
+    }
     let said = driver.get(READINGS).value().unwrap();
     assert!(said.ends_with(&format!("to {}", format_number(largest))), "{said}");
 }
@@ -119,6 +122,8 @@ fn the_whole_window_follows_the_finger() {
     driver.train();
     driver.wait_for_last_epoch();
     let run = trained(small());
+    driver.act("Chart: Readings");
+    driver.settle();
     let before = driver.get(READINGS).value();
     let (at, [row, node]) = over_a_node(&mut driver);
     push(&mut driver, at);

@@ -125,6 +125,7 @@ fn a_section_follows_keys_clicks_and_the_readings_and_is_exported() {
     assert!(words(&mut driver).contains("x along column-wire"));
     driver.click_button("Row-wire");
     // A click on the map of readings chooses its wires: the last row.
+    driver.act("Chart: Readings");
     let readings = driver.get("Readings of the actual surface").rect();
     driver.harness().drag_at(readings.left_bottom() + vec2(12.0, -4.0));
     driver.harness().drop_at(readings.left_bottom() + vec2(12.0, -4.0));

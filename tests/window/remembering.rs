@@ -144,7 +144,11 @@ fn middle(driver: &Driver) -> (f32, Vec2) {
 #[test]
 fn dragged_column_widths_are_remembered() {
     let (_folder, path) = file();
+    // Wide enough for two columns.
+    let wide = vec2(1800.0, 900.0);
     let mut driver = Driver::open_remembering(&path);
+    driver.harness().set_size(wide);
+    driver.settle();
     let usual = edges(&driver);
     drag(&mut driver, usual[0], 40.0);
     drag(&mut driver, usual[1], 30.0);
@@ -156,6 +160,8 @@ fn dragged_column_widths_are_remembered() {
     drop(driver);
 
     let mut driver = Driver::open_remembering(&path);
+    driver.harness().set_size(wide);
+    driver.settle();
     assert_eq!((edges(&driver), middle(&driver)), (drawn, seen));
     // No further than the surfaces allow.
     drag(&mut driver, drawn[0], 900.0);

@@ -14,11 +14,11 @@ use crate::window::{
         SourceKind, ToCopy, ViewKind,
     },
     theme,
-    training_worker::{Asked, LOST, Origin, Request, RunView, TrainedRun},
+    training_worker::{LOST, Origin, Request, RunView, TrainedRun},
     views::CHECKPOINT,
 };
 use decoupler_core::evaluation::RunSettings;
-use decoupler_files::import::{Plan, Setup};
+use decoupler_files::import::Setup;
 
 impl DecouplerWindow {
     /// Applies an effect requested by a view.
@@ -151,14 +151,10 @@ impl DecouplerWindow {
         }
         if !is_chosen {
             let Ok(asked) = shared.asked() else { return };
-            // The history of readings may have been chosen with the settings.
-            let samples = |asked: &Asked| {
-                let mut plan = Plan::clone(asked.plan.as_ref()?);
-                plan.import.memory = None;
-                Some(plan)
+            let has_same = match (&asked.plan, run.setup.plan()) {
+                (Some(plan), Some(of_run)) => plan.files() == of_run.files(),
+                _ => have_same_test_set(&asked.settings, run.settings()),
             };
-            let has_same = samples(&asked) == samples(&run.asked)
-                && (asked.plan.is_some() || have_same_test_set(&asked.settings, run.settings()));
             if !has_same || shared.run.is_some() {
                 return;
             }

@@ -1,7 +1,9 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use decoupler_files::export::exit_leaving_nothing;
-use eframe::egui::{self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder};
+use eframe::egui::{
+    self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder, ViewportCommand, vec2,
+};
 
 use super::{
     commands::{DraftsUndoer, SCALES, drafts},
@@ -23,6 +25,7 @@ use crate::{
         theme::{self, Theme, space},
         training_worker::{Request, Worker},
         views::Views,
+        widgets::focus_ring_ui,
     },
 };
 
@@ -60,6 +63,8 @@ pub struct DecouplerWindow {
     pub(super) ctx: Context,
     /// Files that the window was opened with.
     pub(super) given: Vec<PathBuf>,
+    /// True until the first frame.
+    is_new: bool,
 }
 
 impl DecouplerWindow {
@@ -119,6 +124,7 @@ impl DecouplerWindow {
             wake,
             ctx: ctx.clone(),
             given: Vec::new(),
+            is_new: true,
         };
         if let Some(damage) = damage {
             window.notices.fail(Matter::Memory, damage);
@@ -189,6 +195,9 @@ impl DecouplerWindow {
         if ui.input(|input| input.events.contains(&Event::WindowFocused(true))) {
             self.runs.ask(RunsRequest::Look);
         }
+        if std::mem::take(&mut self.is_new) {
+            self.fit_the_screen();
+        }
         let mut effects = Vec::new();
         let offers = self.take_commands(ui.ctx(), &mut effects);
         self.take_dropped(ui.ctx());
@@ -198,7 +207,7 @@ impl DecouplerWindow {
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
         // Widths of the columns at which their names do not touch their values, and at which the table fits.
         let [form_min, report_min] = [space(62), space(82)];
-        let has_report = kind.has_report(ui.available_width());
+        let has_report = shared.has_report(ui.available_width());
         // Wider columns must leave the middle this width.
         let within = |min: f32, max: f32, room: f32| Rangef::new(min, (room - space(176)).clamp(min, max));
         let for_form = ui.available_width() - if has_report { report_min } else { 0.0 };
@@ -214,8 +223,8 @@ impl DecouplerWindow {
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
                 top_bar_ui(ui, kind, &offers, |ui| {
-                    export_menu_ui(ui, || view.shown(shared), &mut effects);
                     view.tools_ui(ui, shared, &mut effects);
+                    export_menu_ui(ui, || view.shown(shared), &mut effects);
                 })
             });
         let status_line = Panel::bottom("status line")
@@ -249,6 +258,12 @@ impl DecouplerWindow {
         for part in parts.into_iter().flatten() {
             card_menu_ui(part, || view.shown(shared), &mut effects);
         }
+        let focused = ui.memory(|memory| memory.focused());
+        let focused = focused.and_then(|id| ui.ctx().read_response(id));
+        // The edge of a column.
+        if let Some(edge) = focused.filter(|focused| focused.rect.height() >= form.response.rect.height()) {
+            focus_ring_ui(ui, &edge);
+        }
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
         }
@@ -264,6 +279,15 @@ impl DecouplerWindow {
         self.remember();
         // Work begun in this frame must be finished too.
         self.take_close_request();
+    }
+
+    /// Fills the screen if the window would reach beyond it with its title bar: its status line would be out of sight.
+    fn fit_the_screen(&self) {
+        let size = self.ctx.content_rect().size() + vec2(0.0, space(18));
+        let screen = self.ctx.input(|input| input.viewport().monitor_size);
+        if screen.is_some_and(|screen| size.x > screen.x || size.y > screen.y) {
+            self.ctx.send_viewport_cmd(ViewportCommand::Maximized(true));
+        }
     }
 
     /// Applies the effects requested by views.

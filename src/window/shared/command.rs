@@ -146,6 +146,8 @@ pub struct Offer {
     pub command: Command,
     /// False if it is not available now.
     pub is_possible: bool,
+    /// The view that must be shown first, if it is another one.
+    pub of: Option<ViewKind>,
 }
 
 /// The commands of this frame. The caller that offers a command carries it out when [`Self::offer`] returns true: its keys were
@@ -181,7 +183,12 @@ impl<'a> Offers<'a> {
         };
         let keys = command.about().keys.filter(may_hear);
         let is_pressed = keys.is_some_and(|keys| self.ctx.input_mut(|input| input.consume_shortcut(&keys)));
-        self.list.push(Offer { command, is_possible });
+        let of = None;
+        self.list.push(Offer {
+            command,
+            is_possible,
+            of,
+        });
         is_possible && (is_picked || is_pressed)
     }
 

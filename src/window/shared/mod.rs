@@ -25,4 +25,4 @@ pub use offers::{FileInUse, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
 pub use run_view::{run_buttons_ui, sentence, training_status};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_settings};
-pub use view::{Holdings, MIN_WIDTH_FOR_REPORT, Status, Tone, Unfinished, View, ViewKind};
+pub use view::{Holdings, Status, Tone, Unfinished, View, ViewKind};

@@ -153,6 +153,16 @@ impl Shared {
         }
     }
 
+    /// Returns true if the displayed view has a column on the right in a window of this width in points, which leaves the
+    /// middle enough room: two surfaces, or the values of a recording over time.
+    pub fn has_report(&self, window_width: f32) -> bool {
+        let min_width = match self.source {
+            SourceKind::Array => 1700.0,
+            SourceKind::Recording => 1400.0,
+        };
+        self.shown == ViewKind::Train && window_width >= min_width
+    }
+
     /// Settings of the next training.
     pub fn settings(&self) -> RunSettings {
         match self.source {

@@ -1,8 +1,8 @@
 //! Components that egui lacks, each accessible by its label, and the reason why text typed into a field was refused.
 
 use eframe::egui::{
-    Align, Button, CollapsingHeader, Color32, DragValue, FontId, Frame, Id, Key, Label, Layout, Margin, ProgressBar,
-    Rect, Response, RichText, ScrollArea, Stroke, StrokeKind, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
+    Align, Button, CollapsingHeader, Color32, DragValue, Frame, Id, Key, Label, Layout, Margin, ProgressBar, Rect,
+    Response, RichText, ScrollArea, Stroke, StrokeKind, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
     accesskit::{Invalid, Role},
     vec2,
 };
@@ -274,7 +274,9 @@ pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, col
     let dim = Theme::of(ui).palette.dim;
     ui.horizontal(|ui| {
         let text = |text: &str| RichText::new(text).size(type_size().note);
-        ui.label(text(name).color(dim)).on_hover_text(meaning);
+        let label = ui.label(text(name).color(dim)).on_hover_text(meaning);
+        // The value is read with its name.
+        ui.ctx().accesskit_node_builder(label.id, |node| node.set_hidden());
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let response = ui.add(Label::new(text(value).color(colour)).truncate());
             let label = format!("{name}: {value}");
@@ -396,28 +398,26 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
             picked = to;
         }
     };
-    // The layout is right to left: next, number, previous.
-    let next = Some(shown + 1).filter(|next| *next < snapshots);
-    arrow_ui(ui, "›", next, "Next", "Page down");
+    let (title, window) = (format!("Test {what}"), ui.ctx().content_rect().width());
+    let dim = Theme::of(ui).palette.dim;
+    let label = (window >= 1200.0).then(|| ui.label(RichText::new(&title).color(dim)));
+    arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
     let mut number = shown + 1;
     let suffix = format!(" of {}", snapshots.max(1));
     let field = DragValue::new(&mut number).range(1..=snapshots.max(1)).suffix(suffix);
     let field = ui
         .add_enabled(snapshots > 0, field)
         .on_hover_text("Type a number, or drag.");
-    arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
-    if number != shown + 1 && snapshots > 0 {
-        picked = Some(number - 1);
-    }
-    let title = format!("Test {what}");
-    let dim = Theme::of(ui).palette.dim;
-    let font = FontId::proportional(type_size().body);
-    let width = ui.painter().layout_no_wrap(title.clone(), font, dim).size().x;
-    if ui.available_width() >= width {
-        let label = ui.label(RichText::new(&title).color(dim));
+    if let Some(label) = label {
         field.labelled_by(label.id);
     } else {
         ui.ctx().accesskit_node_builder(field.id, |node| node.set_label(title));
     }
-    picked
+    let next = Some(shown + 1).filter(|next| *next < snapshots);
+    arrow_ui(ui, "›", next, "Next", "Page down");
+    if number != shown + 1 && snapshots > 0 {
+        Some(number - 1)
+    } else {
+        picked
+    }
 }

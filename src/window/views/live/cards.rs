@@ -18,7 +18,7 @@ use crate::window::{
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
-        card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
+        card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, invitation_ui, note_ui, scrolled_ui,
         section_heading_ui, segmented_ui, slider_ui,
     },
 };
@@ -27,7 +27,12 @@ use crate::window::{
 pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let whole = ui.available_rect_before_wrap();
     let Some(answer) = view.shown.answer.clone() else {
-        card_ui(ui, whole, |ui| invitation_ui(ui, view, shared, effects));
+        card_ui(ui, whole, |ui| {
+            let text = invitation(view, shared);
+            if invitation_ui(ui, &text, "Play the sample recording", view.running.is_none()) {
+                view.play_sample(shared);
+            }
+        });
         ui.allocate_rect(whole, Sense::hover());
         return;
     };
@@ -173,26 +178,6 @@ pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look)
     .with_common_scales()
 }
 
-/// Shows what an empty view waits for, and the buttons that fill it.
-fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    ui.vertical_centered(|ui| {
-        ui.add_space((0.5 * ui.available_height() - space(15)).max(0.0));
-        ui.set_max_width(ui.available_width().min(space(105)));
-        ui.label(RichText::new(invitation(view, shared)).color(Theme::of(ui).palette.dim));
-        ui.add_space(space(4));
-        let can_train = view.network(shared).is_none() && !shared.phase.is_busy();
-        if can_train && ui.add(primary_button("Train a network now")).clicked() {
-            effects.extend([Effect::ShowTraining, Effect::Train]);
-        }
-        ui.add_space(space(2));
-        let hint = "Four seconds of a ball that wanders over a simulated array, with a network that decodes them.";
-        let sample = ui.add_enabled(view.running.is_none(), ghost_button("Play the sample recording"));
-        if sample.on_hover_text(hint).clicked() {
-            view.play_sample(shared);
-        }
-    });
-}
-
 /// Returns what an empty view waits for.
 fn invitation(view: &LiveView, shared: &Shared) -> String {
     if let Some(running) = &view.running {
@@ -204,7 +189,7 @@ fn invitation(view: &LiveView, shared: &Shared) -> String {
     let Some((name, _)) = view.network(shared) else {
         return match shared.phase.is_busy() {
             true => "A network is being trained: it can be used here as soon as it is finished.".to_owned(),
-            false => "Live decoding needs a trained network. Training one takes seconds to minutes.".to_owned(),
+            false => "Live decoding needs a trained network. The sample recording comes with one.".to_owned(),
         };
     };
     match view.plan(shared).map(|plan| plan.source) {

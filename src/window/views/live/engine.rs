@@ -61,8 +61,6 @@ pub enum LiveEvent {
 const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 /// Time between attempts to connect to a lost device or socket again.
 const BETWEEN_TRIES: Duration = Duration::from_secs(1);
-/// Longest time in seconds between lines of a stream that is no gap.
-const LONGEST_BURST_S: f64 = 1.0;
 /// Maximum wait for a command while the source is paused.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
@@ -201,8 +199,8 @@ pub struct Answered {
     pub readings: Option<HeatMap>,
     /// Rows and columns of the readings whose wires are faulty, from 0.
     pub faulty: [Vec<usize>; 2],
-    /// Of a network of a recording: times from the start in seconds, first samples after gaps, and samples × targets.
-    pub over_time: Option<(Vec<f64>, Vec<usize>, Array2<f64>)>,
+    /// Of a network of a recording: first samples after gaps, times from the start in seconds, and samples × targets.
+    pub over_time: Option<(Vec<usize>, Vec<f64>, Array2<f64>)>,
     /// All of them: of a recording, from its beginning.
     pub history: History,
     /// How far the answer can be trusted.
@@ -214,7 +212,7 @@ pub struct Answered {
 impl Answered {
     /// Returns the values of a network of a recording over time.
     pub fn series(&self) -> Option<TimeSeries<'_>> {
-        let (places, gaps, decoded) = self.over_time.as_ref()?;
+        let (gaps, places, decoded) = self.over_time.as_ref()?;
         Some(TimeSeries {
             targets: &self.network.problem.targets,
             axis: PlotAxis::linear("time (s)"),
@@ -364,18 +362,15 @@ impl Screen {
         let Some(array) = &session.array else {
             let history = session.history.until(last.time_s);
             // Times of a recording begin at 0 s, too.
-            let (start_s, is_stream) = match &session.input {
-                Input::Replay(replay) => (last.time_s - replay.state.at_s, false),
-                _ => (0.0, true),
+            let start_s = match &session.input {
+                Input::Replay(replay) => last.time_s - replay.state.at_s,
+                _ => 0.0,
             };
             let places = Vec::from_iter(history.iter().map(|(time_s, _)| time_s - start_s));
-            let mut gaps = timeline::gaps(&places);
-            // Lines of a stream arrive in bursts.
-            gaps.retain(|&gap| !is_stream || places[gap] - places[gap - 1] > LONGEST_BURST_S);
             let problem = &self.network.problem;
             let shape = (places.len(), problem.targets.len());
             let decoded = Array2::from_shape_fn(shape, |(sample, target)| history[sample].1[target]);
-            answered.over_time = Some((places, gaps, decoded));
+            answered.over_time = Some((timeline::gaps(&places), places, decoded));
             let outside = outside(session, problem.feature_count(), "target");
             answered.confidence = vec![outside, self.drift(session)];
             return answered;

@@ -131,7 +131,7 @@ impl LiveView {
         });
         Ok(SessionPlan {
             network: Arc::clone(network),
-            source: self.source.plan(simulation.is_some())?,
+            source: self.source.plan()?,
             noise: noise.unwrap_or_default(),
             zero: self.shown.zero.clone(),
             unit: Unit::Frames,
@@ -385,7 +385,7 @@ impl View for LiveView {
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let primary = &COMMANDS[usize::from(self.running.is_none())];
         let others = if self.has_sensor(shared) { &COMMANDS[2..4] } else { &[] };
-        for command in std::iter::once(primary).chain(others) {
+        for command in others.iter().rev().chain([primary]) {
             command_ui(ui, command, self, shared, effects);
         }
     }

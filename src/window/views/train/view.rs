@@ -20,8 +20,8 @@ use crate::window::{
     job::Wake,
     plotting::SeriesView,
     shared::{
-        Command, Effect, Holdings, MIN_WIDTH_FOR_REPORT, Offers, Phase, RightCard, RunResult, Shared, Shown,
-        SourceKind, Status, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind, Status, Unfinished,
+        View, run_buttons_ui,
     },
     test_view::{Drawing, TestView},
     theme::space,
@@ -93,16 +93,19 @@ impl View for TrainView {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        run_buttons_ui(ui, shared, effects);
-        ui.add_space(space(4));
         let what = match shared.source {
             SourceKind::Array => "snapshot",
             SourceKind::Recording => "sample",
         };
         let snapshots = shared.test().map_or(0, TestView::snapshots);
-        if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, snapshots) {
-            self.show_snapshot(snapshot);
+        // In a very narrow window the keys remain.
+        if ui.ctx().content_rect().width() >= 800.0 {
+            if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, snapshots) {
+                self.show_snapshot(snapshot);
+            }
+            ui.add_space(space(4));
         }
+        run_buttons_ui(ui, shared, effects);
     }
 
     fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
@@ -209,7 +212,7 @@ impl TrainView {
     /// Shows both surfaces above, the charts below, and next to them the readings of an array. In a narrow window, the report
     /// takes the place of the readings, so that the surfaces keep their width.
     fn workbench_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let is_narrow = ui.ctx().content_rect().width() < MIN_WIDTH_FOR_REPORT;
+        let is_narrow = !shared.has_report(ui.ctx().content_rect().width());
         let whole = ui.available_rect_before_wrap();
         let gap = space(2);
         let (share, least) = if is_narrow {
