@@ -118,3 +118,21 @@ pub fn gaps(times: &[f64]) -> Vec<usize> {
     let is_gap = |place: &usize| intervals[place - 1] < 0.0 || intervals[place - 1] > longest;
     (1..times.len()).filter(is_gap).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_is_a_step_back_or_more_than_five_intervals() {
+        for (times, expected) in [
+            (&[0.0, 0.1, 0.2, 0.3, 0.9, 1.0][..], &[4][..]),
+            (&[0.0, 0.1, 0.2, 0.0, 0.1], &[3]),
+            (&[0.0, 0.0, 0.1, 0.1, 0.2], &[]),
+            (&[0.0, 0.1, 0.55], &[]),
+            (&[], &[]),
+        ] {
+            assert_eq!(gaps(times), expected, "{times:?}");
+        }
+    }
+}

@@ -312,6 +312,7 @@ fn scenes_that_move_sideways_report_their_condition_number() {
     assert_eq!(condition(&driver), of(&driver.state().draft));
     assert!(driver.says("even rounding hides it"));
     driver.train();
+    driver.details();
     assert!(driver.says("This scene is ill-conditioned (condition number"));
     let table = driver.table();
     // Exact readings leave this scene open: solving the equations for every row-wire would take too long.

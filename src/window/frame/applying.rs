@@ -43,7 +43,7 @@ impl DecouplerWindow {
             Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
             Effect::ChooseSource(_) => {}
             Effect::TakeSetup(setup) => self.take_setup(&setup),
-            Effect::ShowTraining => self.show(ViewKind::Train),
+            Effect::Show(view) => self.show(view),
             Effect::OpenRun(id) => self.open_run(id, true),
             Effect::Train => match shared.setup() {
                 Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
@@ -80,6 +80,7 @@ impl DecouplerWindow {
                 self.worker.ask(Request::Continue(shared.settings().training));
             }
             Effect::Continue => {}
+            Effect::UseRidge => self.worker.ask(Request::UseRidge),
             Effect::Stop => {
                 self.worker.ask(Request::Stop);
                 // The training being prepared does not begin; the previous one stays.
@@ -247,7 +248,7 @@ impl DecouplerWindow {
     /// asked, but does not know which files are in use.
     pub(super) fn answer(&mut self, task: FileTask, path: PathBuf, asks: bool) {
         match &task.purpose {
-            Purpose::Save(contents) => {
+            Purpose::Save(contents) | Purpose::Decode(contents) => {
                 let (send, taken) = channel();
                 let (run, contents) = (contents.run, contents.clone());
                 let take = move |trained: Result<Option<&TrainedRun>, &str>| {
@@ -267,7 +268,11 @@ impl DecouplerWindow {
                     }
                     None => take(Ok(None)),
                 }
-                let used = self.files_in_use(&task);
+                let used = if task.is_read() {
+                    Vec::new()
+                } else {
+                    self.files_in_use(&task)
+                };
                 self.files.write(ToWrite { task, path, asks }, used, move |path| {
                     let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
                     taken?(path)

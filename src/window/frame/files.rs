@@ -104,7 +104,7 @@ impl Files {
     ) {
         let (path, asks) = (to_write.path.clone(), to_write.asks);
         // A folder is never replaced as a whole; a file that is being written counts as existing.
-        let asks = asks && !to_write.task.words.extensions.is_empty();
+        let asks = asks && !to_write.task.is_read() && !to_write.task.words.extensions.is_empty();
         let is_under_way = self.paths().any(|other| other == path);
         let work = move || match refuse_in_use(&path, &used) {
             Err(reason) => Written::InUse(reason),

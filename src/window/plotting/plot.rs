@@ -118,26 +118,32 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
     let slot = |index: usize| {
         if figure.is_stacked {
             let top = whole.top() + height * index as f32;
-            let bottom = if index + 1 == figure.plots.len() {
+            let is_last = index + 1 == figure.plots.len();
+            let bottom = if is_last {
                 whole.bottom()
             } else {
-                top + height
+                top + height - space(2)
             };
             return Rect::from_x_y_ranges(whole.x_range(), top..=bottom);
         }
         let left = whole.left() + (width + space(3)) * index as f32;
         Rect::from_min_size([left, whole.top()].into(), Vec2::new(width, whole.height()))
     };
+    let widths = figure
+        .plots
+        .iter()
+        .map(|plot| measure(ui.painter(), &plot.y.name).x + space(6));
+    let names = widths.fold(0.0, f32::max).min(NAME);
     let plots = figure.plots.iter().enumerate().map(|(index, plot)| {
         let is_last = index + 1 == figure.plots.len();
         let mut slot = slot(index);
         if figure.is_stacked {
-            let place = slot.with_max_x(slot.left() + NAME).shrink2(Vec2::new(0.0, space(2)));
+            let place = slot.with_max_x(slot.left() + names).shrink2(Vec2::new(0.0, space(2)));
             let name = Label::new(RichText::new(&plot.y.name).size(type_size().note)).wrap();
             let mut beside = ui.new_child(UiBuilder::new().max_rect(place));
             beside.set_clip_rect(place);
             beside.add(name);
-            slot.min.x += NAME;
+            slot.min.x += names;
         }
         let track = figure.is_stacked.then_some(is_last);
         let mut slot = ui.new_child(UiBuilder::new().max_rect(slot));
@@ -173,6 +179,10 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = space(1);
         for (name, look) in keys {
+            // A line and its name stay together.
+            if ui.available_size_before_wrap().x < 1.2 * measure(ui.painter(), name).x + space(7) {
+                ui.end_row();
+            }
             let (place, _) = ui.allocate_exact_size(Vec2::splat(space(4)), Sense::hover());
             paint(
                 ui.painter(),

@@ -15,7 +15,7 @@ mod view;
 pub use super::training_worker::{OpenPlan, RunResult, RunView};
 pub use command::{About, Command, Offer, Offers};
 pub use effect::{Effect, Matter, Notice};
-pub use error_table::error_table_ui;
+pub use error_table::{error_table_ui, targets_table_ui};
 pub use export::{
     ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, ToCopy, file_stem,
     saying_saved,

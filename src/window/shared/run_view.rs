@@ -67,7 +67,12 @@ pub fn training_status(shared: &Shared) -> Status {
 /// Returns the phase as text.
 fn phase_in_words(shared: &Shared) -> Status {
     let is_recording = shared.source == SourceKind::Recording;
-    let (tone, text) = match shared.phase {
+    let phase = match shared.phase {
+        // A result that is not shown any more is no state of what is.
+        Phase::Ended(_) if shared.shown_run().is_none() => Phase::Idle,
+        phase => phase,
+    };
+    let (tone, text) = match phase {
         Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
         Phase::Idle => (Tone::Calm, "Ready: press Train"),
         Phase::Preparing if is_recording => {

@@ -43,6 +43,8 @@ pub enum Request {
     Resume,
     /// End the training and keep its network.
     Stop,
+    /// Answer with ridge regression in place of the network of the ended training.
+    UseRidge,
     /// Inspect this training, unless another one has replaced it.
     Inspect(RunId, Inspection),
     /// Keep checkpoints of running trainings in this folder from now on, saved at this interval.

@@ -122,7 +122,11 @@ impl<'a> TrainingLoop<'a> {
                 let calibrated = current.calibrated(&|| true);
                 self.end(calibrated);
             }
-            (Request::Pause | Request::Resume | Request::Stop, _) => {}
+            (Request::UseRidge, Some(current)) if current.stage == Stage::Done => {
+                let calibrated = current.trained.use_ridge();
+                self.end(Some(calibrated));
+            }
+            (Request::Pause | Request::Resume | Request::Stop | Request::UseRidge, _) => {}
             (Request::Inspect(id, inspection), Some(current)) if current.id == id => {
                 inspection(Ok(&current.trained));
             }
@@ -489,6 +493,18 @@ impl TrainedRun {
             drift: self.drift.clone(),
             ..file
         })
+    }
+
+    /// Answers with ridge regression in place of the network from now on; returns its intervals, or why there are none.
+    fn use_ridge(&mut self) -> Result<Intervals, String> {
+        let calibration = self.calibration.as_ref().ok_or(LOST)?;
+        let (combined, intervals) = calibration.ridge(&self.run).map_err(|error| error.to_string())?;
+        if let Some(recorded) = &mut self.recorded {
+            recorded.combined = Some(combined.clone());
+            recorded.chosen_intervals = intervals.clone().ok();
+        }
+        self.run.set_combined(Some(combined));
+        intervals.map_err(|reason| format!("no 90 % intervals: {reason}"))
     }
 
     /// Returns the current state, to be resumed later.

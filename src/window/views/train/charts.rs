@@ -94,7 +94,7 @@ const HISTOGRAM: Chart = Chart {
         let (pairs, of) = pairs(view, shared)?;
         Some(histogram_figure(&pairs, of).into())
     },
-    bar_ui: target_bar_ui,
+    bar_ui: lower_target_ui,
     ..BARE
 };
 
@@ -413,12 +413,21 @@ pub(super) fn lit_nodes(view: &TrainView, shared: &Shared) -> Vec<usize> {
 
 /// The choice of the target, where there are several.
 fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    chosen_target_ui(ui, view, shared, "target of the answers");
+}
+
+/// The same in the card below.
+fn lower_target_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    chosen_target_ui(ui, view, shared, "target of the charts");
+}
+
+fn chosen_target_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, id: &str) {
     if let Some(test) = shared
         .test()
         .filter(|test| test.skin.is_none() && shared.result().is_some())
     {
         let targets = &test.problem.targets;
-        target_choice_ui(ui, "Target", "target of the charts", targets, &mut view.target);
+        target_choice_ui(ui, "Target", id, targets, &mut view.target);
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the Train view shows of the current training, for export.
 
-use decoupler_core::evaluation::DecoderReport;
-use decoupler_files::export::{decoder_table, error_table, loss_table};
+use decoupler_core::{evaluation::DecoderReport, problem::Channel};
+use decoupler_files::export::{Cell, Table, decoder_table, error_table, loss_table};
 
 use super::{
     charts::{SURFACES, lower_chart, upper_chart},
@@ -63,6 +63,11 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     });
     let of_epoch = past.map(|epoch| format!("-epoch{epoch}")).unwrap_or_default();
     shown.push(Shown::table("Error table", stem("errors") + &of_epoch, errors));
+    let predictions = run.clone().and_then(|run| {
+        let result = view.result(shared).ok_or("Nothing is decoded yet.")?;
+        Ok(move || predictions_table(run, result))
+    });
+    shown.push(Shown::table("Test predictions", stem("test") + &of_epoch, predictions));
     let losses = run.clone().map(|run| || loss_table(&run.history));
     shown.push(Shown::table("Loss curves", stem("loss"), losses));
     let decoders = run.clone().and_then(|run| {
@@ -80,6 +85,35 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     });
     shown.push(Shown::file("Checkpoint", standing));
     shown
+}
+
+/// Actual and decoded values of every test sample, with the half-widths of the 90 % intervals.
+fn predictions_table(run: &RunView, result: &RunResult) -> Table {
+    let (test, intervals) = (&run.test, result.intervals.as_ref());
+    let titled = |target: &Channel, what: &str| Channel {
+        name: format!("{}_{what}", target.name),
+        ..target.clone()
+    };
+    let of_target = |target: &Channel| {
+        let half_width = intervals.map(|_| titled(target, "half_width_90"));
+        let columns = [titled(target, "actual"), titled(target, "decoded")];
+        Vec::from_iter(columns.into_iter().chain(half_width).map(|channel| channel.title()))
+    };
+    let headings = run.problem.targets.iter().flat_map(of_target);
+    let rows = (0..test.set.samples()).map(|sample| {
+        let values = (0..test.set.outputs()).flat_map(|target| {
+            let [actual, decoded] = [test.set.targets()[[sample, target]], result.answers[[sample, target]]];
+            let half_width = intervals.map(|intervals| intervals.half_width(target, decoded));
+            [Some(actual), Some(decoded)]
+                .into_iter()
+                .chain(half_width)
+                .map(Cell::Number)
+        });
+        std::iter::once(Cell::from(test.timeline.name(sample)))
+            .chain(values)
+            .collect()
+    });
+    Table::of_headings(std::iter::once("sample".to_owned()).chain(headings), rows)
 }
 
 /// Returns the best network, and before it that of the `past` epoch while it is displayed.

@@ -11,7 +11,7 @@ use super::{
     exports::shown,
     press::{PressState, readings_head_ui},
     recording::{RecordingEditor, recipe_task},
-    report,
+    report::{self, OLD},
     scrub::ScrubState,
     section::SectionChoice,
     surfaces::surfaces_ui,
@@ -20,8 +20,8 @@ use crate::window::{
     job::Wake,
     plotting::SeriesView,
     shared::{
-        Command, Effect, Holdings, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind, Status, Unfinished,
-        View, run_buttons_ui,
+        Command, Effect, Holdings, NetworkSource, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind,
+        Status, Unfinished, View, run_buttons_ui,
     },
     test_view::{Drawing, TestView},
     theme::space,
@@ -75,6 +75,12 @@ impl View for TrainView {
         }
         if offers.offer(Command::OpenFiles, !phase.is_busy()) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
+        }
+        let ended = shared.shown_run().filter(|run| run.stop_reason.is_some());
+        if offers.offer(Command::DecodeFile, ended.is_some())
+            && let Some(run) = ended
+        {
+            effects.push(Effect::ChooseFile(NetworkSource::of(run).decode()));
         }
         if let Some(skin) = shared.skin()
             && offers.offer(Command::PressMiddle, true)
@@ -224,9 +230,16 @@ impl TrainView {
         let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
         let upper = upper.with_max_y(upper.max.y - gap);
         let has_sensor = shared.source == SourceKind::Array;
+        let is_old = shared.shown_run().is_some_and(|run| shared.is_old(run));
+        let opacity = if is_old { OLD } else { 1.0 };
         match has_sensor {
             true => surfaces_ui(ui, upper, self, shared, effects),
-            false => answers_ui(ui, upper, self, shared, effects),
+            false => {
+                ui.scope(|ui| {
+                    ui.multiply_opacity(opacity);
+                    answers_ui(ui, upper, self, shared, effects);
+                });
+            }
         }
         let width = match is_narrow {
             true => (0.45 * lower.width()).clamp(space(82), space(96)),
@@ -245,7 +258,10 @@ impl TrainView {
             charts = lower;
         }
         let has_readings = is_narrow && has_sensor;
-        card_ui(ui, charts, |ui| charts_card_ui(ui, self, shared, has_readings));
+        card_ui(ui, charts, |ui| {
+            ui.multiply_opacity(opacity);
+            charts_card_ui(ui, self, shared, has_readings);
+        });
         ui.allocate_rect(whole, Sense::hover());
     }
 
