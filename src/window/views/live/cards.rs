@@ -4,10 +4,10 @@ use decoupler_core::{live::ZeroGains, text::counted};
 use decoupler_files::{
     export::{format_duration, format_number},
     figure::{
-        HeatMap,
+        HeatMap, TimeSeries,
         surface::{Surface, SurfaceFigure},
     },
-    live::{SourcePlan, Tally},
+    live::SourcePlan,
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo};
 
@@ -218,26 +218,21 @@ fn readings_ui(ui: &mut Ui, readings: &HeatMap, [rows, columns]: &[Vec<usize>; 2
     }
 }
 
-/// Shows the latest value of each target, with its uncertainty.
-fn values_ui(ui: &mut Ui, answer: &Answered) {
-    section_heading_ui(ui, "Targets");
-    let intervals = answer.network.intervals.as_ref();
-    for (index, (target, &value)) in answer.network.problem.targets.iter().zip(&answer.values).enumerate() {
-        let half_width = intervals.and_then(|intervals| intervals.half_width(index, value));
-        let half_width = half_width.map(|half_width| format!(" ± {}", format_number(half_width)));
-        let hint = "Latest decoded value, ± half-width of its 90 % prediction interval if the network has one.";
-        let value = format!("{}{}", format_number(value), half_width.unwrap_or_default());
-        fact_ui(ui, &target.title(), hint, &value);
-    }
-}
-
-/// Shows confidence, the stream, and of an array the unloaded state and the recording; warnings above everything else.
+/// Shows the latest values, confidence, the stream, and of an array the unloaded state and the recording; warnings above
+/// everything else.
 fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shared, effects: &mut Vec<Effect>) {
     if let Some((_, consequence)) = &answer.fault {
         note_ui(ui, consequence);
     }
-    if answer.over_time.is_some() {
-        values_ui(ui, answer);
+    if let Some(TimeSeries { targets, intervals, .. }) = answer.series() {
+        section_heading_ui(ui, "Targets");
+        for (index, (target, &value)) in targets.iter().zip(&answer.values).enumerate() {
+            let half_width = intervals.and_then(|intervals| intervals.half_width(index, value));
+            let half_width = half_width.map(|half_width| format!(" ± {}", format_number(half_width)));
+            let hint = "Latest decoded value, ± half-width of its 90 % prediction interval if the network has one.";
+            let value = format!("{}{}", format_number(value), half_width.unwrap_or_default());
+            fact_ui(ui, &target.title(), hint, &value);
+        }
     }
     section_heading_ui(ui, "Confidence");
     let palette = Theme::of(ui).palette;
@@ -246,16 +241,7 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
         coloured_fact_ui(ui, fact.name, &fact.hint, &fact.value, colour);
     }
     section_heading_ui(ui, "Stream");
-    stream_ui(ui, &view.shown.counts);
-    if answer.readings.is_some() {
-        zero_ui(ui, view);
-        recording_ui(ui, view, shared, effects);
-    }
-    ui.add_space(space(2));
-}
-
-/// Shows latency and losses of the stream.
-fn stream_ui(ui: &mut Ui, counts: &Tally) {
+    let counts = &view.shown.counts;
     let hint = "Time from reading a frame to its answer: median and 99th percentile.";
     let quantile = |share| counts.latencies.quantile(share);
     let [median, high] = [0.5, 0.99].map(|share| quantile(share).map_or_else(|| format_number(None), format_duration));
@@ -268,6 +254,11 @@ fn stream_ui(ui: &mut Ui, counts: &Tally) {
     if let Some(reason) = &counts.last_bad {
         dim_ui(ui, &format!("Last: {reason}"));
     }
+    if answer.readings.is_some() {
+        zero_ui(ui, view);
+        recording_ui(ui, view, shared, effects);
+    }
+    ui.add_space(space(2));
 }
 
 fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
