@@ -8,6 +8,7 @@ use super::{
     DecouplerWindow,
     help::{Help, Page},
     modal::{Modal, Palette},
+    top_bar::SMALL,
 };
 use crate::window::{
     forms::preset_between,
@@ -89,6 +90,7 @@ impl DecouplerWindow {
             (Command::Larger, scale < *SCALES.end() - 0.5 * STEP),
             (Command::Smaller, scale > *SCALES.start() + 0.5 * STEP),
             (Command::UsualSize, (scale - 1.0).abs() > 0.5 * STEP),
+            (Command::Form, self.ctx.content_rect().width() < SMALL),
             (Command::Search, true),
             (Command::Keys, true),
             (Command::Glossary, true),
@@ -123,6 +125,7 @@ impl DecouplerWindow {
             Command::Larger => self.set_scale(self.ctx.zoom_factor() + STEP),
             Command::Smaller => self.set_scale(self.ctx.zoom_factor() - STEP),
             Command::UsualSize => self.set_scale(1.0),
+            Command::Form => self.shows_form ^= true,
             Command::Search => self.modal = Some(Modal::Palette(Palette::default())),
             Command::Keys => self.modal = Some(Modal::Help(Help::open(Page::Keys, ""))),
             Command::Glossary => self.modal = Some(Modal::Help(Help::open(Page::Glossary, ""))),
