@@ -320,7 +320,7 @@ impl View for StudyView {
         self.exports(shared.look.colours)
     }
 
-    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn form_ui(&mut self, ui: &mut Ui, _shared: &Shared, effects: &mut Vec<Effect>) {
         scrolled_ui(ui, "study form", |ui| self.fields_ui(ui, effects));
     }
 
