@@ -1,6 +1,5 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
-use decoupler_files::export::exit_leaving_nothing;
 use eframe::egui::{
     self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder, ViewportCommand, vec2,
 };
@@ -14,19 +13,14 @@ use super::{
     remembered::{Memory, Remembered, WindowFile},
     top_bar::{SMALL, top_bar_ui},
 };
-use crate::{
-    signals::on_termination,
-    window::{
-        job::{Background, Wake},
-        preview::PreviewEvent,
-        shared::{
-            Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status,
-        },
-        theme::{self, Theme, space},
-        training_worker::{Request, Worker},
-        views::Views,
-        widgets::focus_ring_ui,
-    },
+use crate::window::{
+    job::{Background, Wake},
+    preview::PreviewEvent,
+    shared::{Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
+    theme::{self, Theme, space},
+    training_worker::{Request, Worker},
+    views::Views,
+    widgets::focus_ring_ui,
 };
 
 /// A picture to be copied, and the message for the user.
@@ -161,15 +155,6 @@ impl DecouplerWindow {
         if let Some((folder, interval)) = &self.keeping {
             self.worker.ask(Request::Keep(folder.clone(), *interval));
         }
-    }
-
-    /// Saves the running training and ends the program on SIGTERM and SIGHUP, even if the window does not respond.
-    pub(super) fn save_on_termination(&self) {
-        let save = self.worker.saver();
-        on_termination(move |status| {
-            save();
-            exit_leaving_nothing(i32::from(status));
-        });
     }
 
     /// State that all views read.
