@@ -8,7 +8,7 @@ use decoupler_core::{
     sensor::ArrayScale,
     training::Method,
 };
-use eframe::egui::{Key, Modifiers, accesskit::Role};
+use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
 use egui_kittest::kittest::NodeT as _;
 
 use crate::driver::{Driver, PATIENCE, small, table_of};
@@ -294,4 +294,18 @@ fn keys_start_a_training_and_step_through_the_snapshots() {
         "training keeps the displayed snapshot"
     );
     driver.settle();
+}
+
+#[test]
+fn the_first_training_beats_the_linear_map() {
+    let mut driver = Driver::open_first(vec2(1440.0, 900.0));
+    driver.train();
+    driver.settle();
+    let praise = "times as accurate as the linear map";
+    let texts = driver.texts();
+    let text = texts.iter().find(|text| text.contains(praise));
+    let text = text.unwrap_or_else(|| panic!("{texts:#?}"));
+    // "On z 1.74 times as accurate…"
+    let times = text.split(' ').find_map(|word| word.parse::<f64>().ok()).unwrap();
+    assert!(times > 1.5, "{text}");
 }
