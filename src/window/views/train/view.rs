@@ -269,6 +269,9 @@ impl TrainView {
     fn follow(&mut self, shared: &Shared) {
         let (test, result) = (shared.test(), self.scrub.shown(shared));
         self.press.follow(shared, result);
+        if let Some(skin) = shared.skin() {
+            self.section.follow(self.press.place_mm(), skin);
+        }
         self.snapshot = self
             .snapshot
             .min(test.map_or(0, |test| test.snapshots().saturating_sub(1)));
