@@ -3,7 +3,10 @@
 use std::{fs, path::PathBuf};
 
 use decoupler::window::Phase;
-use decoupler_core::{evaluation::RunSettings, scene::Loading};
+use decoupler_core::{
+    evaluation::RunSettings,
+    scene::{Loading, Noise},
+};
 
 use eframe::egui::{Pos2, Vec2, vec2};
 
@@ -16,10 +19,11 @@ fn file() -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// The paper's settings except for the loading.
+/// The paper's settings except for loading and noise.
 fn is_a_print(settings: &RunSettings) -> bool {
     let mut papers = *settings;
-    papers.simulation_mut().unwrap().scene.loading = Loading::RandomNodes;
+    let scene = &mut papers.simulation_mut().unwrap().scene;
+    (scene.loading, scene.noise) = (Loading::RandomNodes, Noise::default());
     papers == RunSettings::default() && matches!(settings.simulation().unwrap().scene.loading, Loading::Indenter(_))
 }
 

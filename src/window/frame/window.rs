@@ -231,19 +231,23 @@ impl DecouplerWindow {
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| ui.max_rect());
-        let form = Panel::left("configuration")
+        // A narrow window does not change the width in a wide one.
+        let is_narrow = ui.available_width() < 1400.0;
+        let form = Panel::left(if is_narrow { "narrow form" } else { "form" })
             .default_size(self.chosen.form_points.unwrap_or(space(68)))
             .size_range(within(form_min, space(110), for_form))
             .frame(panel(side))
-            .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
-        self.chosen.form_points = Some(form.response.rect.width());
+            .show(ui, |ui| view.form_ui(&mut inside(ui), shared, &mut effects));
+        if !is_narrow {
+            self.chosen.form_points = Some(form.response.rect.width());
+        }
         let report = has_report.then(|| {
             let for_report = ui.available_width();
             Panel::right("report")
                 .default_size(self.chosen.report_points.unwrap_or(space(96)))
                 .size_range(within(report_min, space(140), for_report))
                 .frame(panel(side))
-                .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
+                .show(ui, |ui| view.report_ui(&mut inside(ui), shared, &mut effects))
         });
         if let Some(report) = &report {
             self.chosen.report_points = Some(report.response.rect.width());
@@ -267,7 +271,7 @@ impl DecouplerWindow {
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
         }
-        self.notices_ui(ui, middle.response.rect, &mut effects);
+        self.notices_ui(ui, middle.response.rect);
         self.apply_all(effects);
         if let Some(command) = top_bar.inner {
             self.carry_out(&command);
@@ -296,6 +300,12 @@ impl DecouplerWindow {
             self.apply(effect);
         }
     }
+}
+
+/// Returns a part of a column that does not widen it.
+fn inside(column: &mut Ui) -> Ui {
+    column.set_min_size(column.available_size());
+    column.new_child(UiBuilder::new().max_rect(column.max_rect()))
 }
 
 /// Returns `true` if the user did something in this frame that parts of the window already drawn may depend on: one

@@ -482,7 +482,8 @@ impl TrainView {
     /// Offers each chart, and the steps through sections.
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
         // The readings have their own card if there is room.
-        for chart in charts(shared, false) {
+        let has_readings = !shared.has_report(offers.ctx.content_rect().width());
+        for chart in charts(shared, has_readings) {
             if offers.offer(Command::Chart(chart.name), chart.name != self.tab) {
                 self.tab = chart.name;
             }

@@ -153,9 +153,7 @@ fn side_ui(
     if marked != figure.marked_node {
         view.lights.node = marked.and_then(|node| item_at(shared, node));
     }
-    // A pressed surface is cut too.
-    let is_chosen = response.clicked() || (is_touched && response.is_pointer_button_down_on());
-    if let (true, Some(skin)) = (is_chosen && figure.section.is_some(), array)
+    if let (true, Some(skin)) = (response.clicked() && !is_touched && figure.section.is_some(), array)
         && let (Some(at), Some(sight)) = (response.interact_pointer_pos(), shown.sight)
         && let Some(place) = surface.pick(&sight.ray(DVec2::new(f64::from(at.x), f64::from(at.y))))
     {

@@ -242,7 +242,9 @@ impl TrainView {
             }
         }
         let width = match is_narrow {
-            true => (0.45 * lower.width()).clamp(space(82), space(96)),
+            true => (0.45 * lower.width())
+                .clamp(space(82), space(96))
+                .min(0.6 * lower.width()),
             false => (0.4 * lower.width()).floor(),
         };
         let (mut charts, beside) = lower.split_left_right_at_x(lower.right() - width);
@@ -269,6 +271,9 @@ impl TrainView {
     fn follow(&mut self, shared: &Shared) {
         let (test, result) = (shared.test(), self.scrub.shown(shared));
         self.press.follow(shared, result);
+        if let Some(skin) = shared.skin() {
+            self.section.follow(self.press.place_mm(), skin);
+        }
         self.snapshot = self
             .snapshot
             .min(test.map_or(0, |test| test.snapshots().saturating_sub(1)));
