@@ -8,8 +8,8 @@ mod sensor;
 mod training;
 
 pub use network::{hidden_ui, workload_ui};
-pub use presets::{follow_preset, preset_ui};
-pub use scene::{SAMPLES, of_samples, of_scene, scene_ui, size_ui};
+pub use presets::{follow_preset, preset_between, preset_ui};
+pub use scene::{SAMPLES, of_samples, of_scene, scene_ui};
 pub use sensor::{array_ui, geometry_ui};
 pub use training::method_ui;
 
@@ -74,7 +74,7 @@ pub enum Look {
 }
 
 /// Value of a setting in the table, and its text in the window.
-type Choice = (&'static str, &'static str);
+pub type Choice = (&'static str, &'static str);
 
 /// Value of a setting that has not been chosen yet.
 const AUTOMATIC: &str = "automatic";
@@ -201,6 +201,12 @@ impl Row {
             debug_assert!(set.is_ok(), "{set:?}");
         }
     }
+}
+
+/// Returns the values of a setting of the network or its training, and what the window calls them; none of a number.
+pub fn choices(setting: &str) -> Vec<Choice> {
+    let mut rows = network::INPUTS.iter().chain([&training::METHOD]);
+    rows.find(|row| row.0 == setting).map_or_else(Vec::new, Row::choices)
 }
 
 /// Returns the definition of a term.

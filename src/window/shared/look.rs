@@ -8,13 +8,15 @@ use decoupler_files::{
         surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
     },
 };
-use eframe::egui::{Align, Button, ComboBox, CursorIcon, Layout, Popup, Rect, Sense, Ui, UiBuilder, vec2};
+use eframe::egui::{
+    Align, Button, ComboBox, CursorIcon, Label, Layout, Popup, Rect, RichText, Sense, Ui, UiBuilder, vec2,
+};
 
 use super::Effect;
 use crate::window::{
     surface_view::{SurfaceView, SurfaceViewResponse, colour_bar_ui},
     test_view::HeightScale,
-    theme::{rgb, space},
+    theme::{rgb, semibold, space, type_size},
     widgets::{card_ui, dim_ui, section_heading_ui, segmented_ui},
 };
 
@@ -105,6 +107,20 @@ pub fn surface_cards_ui(
         let slot = Rect::from_x_y_ranges(scales.x_range(), top..=top + part).shrink2(vec2(0.0, space(4)));
         colour_scale_ui(ui, slot, scale, &note, look, effects);
     }
+}
+
+/// The title of a card, as far as the options at its right leave room for it.
+pub fn card_head_ui(ui: &mut Ui, title: &str, options_ui: impl FnOnce(&mut Ui)) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            options_ui(ui);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let title = RichText::new(title).font(semibold(type_size().title));
+                ui.add(Label::new(title).truncate());
+            });
+        });
+    });
 }
 
 /// Shows a surface, turns all surfaces as it is turned, and marks the node under the pointer on its neighbours too.

@@ -7,13 +7,13 @@ use decoupler_files::{
         surface::{Quantity, Surface, SurfaceFigure},
     },
 };
-use eframe::egui::{Align, Layout, RichText, Sense, Ui};
+use eframe::egui::{RichText, Sense, Ui};
 
 use super::{Analysis, SensorView, view::RECORDED};
 use crate::window::{
     forms::meaning,
     plotting::titled_plots_ui,
-    shared::{Effect, Look, Shared, Shown, SourceKind, surface_cards_ui, surface_ui, view_mode_ui},
+    shared::{Effect, Look, Shared, Shown, SourceKind, card_head_ui, surface_cards_ui, surface_ui, view_mode_ui},
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, fact_ui, fields::capitalised, note_ui, scrolled_ui, section_heading_ui, segmented_ui},
@@ -79,18 +79,14 @@ fn pattern_ui(
     effects: &mut Vec<Effect>,
 ) {
     let surface = &figure.surfaces[place];
-    ui.horizontal(|ui| {
-        ui.set_min_height(space(7));
-        ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| match surface.quantity {
-            Quantity::Pattern => view_mode_ui(ui, look, effects),
-            // Several coordinates are unknown.
-            _ if analysis.surfaces.len() > 1 => {
-                let options = [(0, "x"), (1, "y"), (2, "z")];
-                *axis = segmented_ui(ui, "Displayed axis", &options, *axis, false).unwrap_or(*axis);
-            }
-            _ => {}
-        });
+    card_head_ui(ui, &surface.title, |ui| match surface.quantity {
+        Quantity::Pattern => view_mode_ui(ui, look, effects),
+        // Several coordinates are unknown.
+        _ if analysis.surfaces.len() > 1 => {
+            let options = [(0, "x"), (1, "y"), (2, "z")];
+            *axis = segmented_ui(ui, "Displayed axis", &options, *axis, false).unwrap_or(*axis);
+        }
+        _ => {}
     });
     let view = SurfaceView {
         label: ["Worst-seen deformation of each row", "Sensitivity of each node"][place],

@@ -70,9 +70,11 @@ pub struct Decoders {
 #[derive(Default)]
 struct Fitted {
     set: Option<Result<DecoderSet, String>>,
-    /// Each with the seconds that it took, or why it cannot be used.
-    decoders: HashMap<(DecoderKind, Precision), Result<(Box<dyn Decoder>, f64), String>>,
+    decoders: HashMap<(DecoderKind, Precision), FittedDecoder>,
 }
+
+/// A decoder with the seconds that its fit took, or why it cannot be used.
+type FittedDecoder = Result<(Box<dyn Decoder>, f64), String>;
 
 /// Result of a decoder.
 #[derive(Clone, Debug, PartialEq)]
