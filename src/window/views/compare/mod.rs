@@ -63,12 +63,12 @@ impl View for CompareView {
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        self.fill_sides(&shared.runs, effects);
         run_list_ui(ui, shared, &mut self.removing, effects);
     }
 
     /// Shows the surfaces of both runs above, their curves and figures below.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
+        self.fill_sides(&shared.runs, effects);
         surfaces_above_ui(ui, |ui, [upper, left, right]| {
             let (figure, look) = (self.figure(shared), shared.look);
             surface_cards_ui(
