@@ -155,9 +155,16 @@ fn colours_and_scales_are_chosen_at_the_bar_and_colours_are_remembered() {
     assert_eq!(driver.state().look.colours, SequentialMap::Cividis);
     let value = |driver: &Driver, label: &str| driver.get(label).accesskit_node().value().unwrap();
     assert_eq!(value(&driver, "Colour scale of z (mm)"), "4.00 to 5.00");
-    driver.act("Free the scale of heights");
+    driver.click("Colour scale of z (mm)");
+    driver.click("Free");
+    driver.settle();
+    driver.press(Key::Escape);
     assert_ne!(value(&driver, "Colour scale of z (mm)"), "4.00 to 5.00");
-    driver.act("Lock the scale of heights");
+    driver.click("Colour scale of z (mm)");
+    driver.click("Locked");
+    driver.settle();
+    driver.press(Key::Escape);
+    driver.settle();
     assert_eq!(value(&driver, "Colour scale of z (mm)"), "4.00 to 5.00");
     driver.configure_small();
     driver.train();

@@ -166,7 +166,6 @@ impl RunView {
             best_epoch: training.best_epoch,
             defect: None,
             epochs_run: training.epochs,
-            starts_ended: training.starts.len(),
             wall_time: None,
             frame_time: frame_time.map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
             is_idle: true,
