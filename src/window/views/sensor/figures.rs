@@ -39,7 +39,7 @@ pub(super) fn analysis_ui(
             pattern_ui(ui, &figure, place, look, analysis, &mut picked, effects);
         });
         card_ui(ui, left, |ui| {
-            titled_plots_ui(ui, "Singular values", &singular_values(analysis))
+            titled_plots_ui(ui, "Singular values", &singular_values(analysis));
         });
         card_ui(ui, right, |ui| {
             scrolled_ui(ui, "sensor facts", |ui| facts_ui(ui, analysis));
