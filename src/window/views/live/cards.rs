@@ -14,7 +14,9 @@ use eframe::egui::{Align, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo}
 use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
     plotting::{SeriesView, cells_ui},
-    shared::{Command, Effect, Look, Shared, card_head_ui, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui},
+    shared::{
+        Command, Effect, Look, Shared, card_head_ui, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui,
+    },
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
