@@ -242,7 +242,7 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
     let quantile = |share| counts.latencies.quantile(share);
     let [median, high] = [0.5, 0.99].map(|share| quantile(share).map_or_else(|| format_number(None), format_duration));
     fact_ui(ui, "Latency", hint, &format!("median {median}, 99 % within {high}"));
-    fact_ui(ui, "Decoded", "Frames since the start.", &counts.decoded.to_string());
+    fact_ui(ui, "Decoded", "Answers so far.", &counts.decoded.to_string());
     let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
     fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
     let hint = "Malformed lines, and frames that could not be decoded.";
