@@ -72,10 +72,9 @@ pub(super) struct Decode {
 
 impl Decode {
     pub(super) fn run(self) -> Result<(), Failure> {
-        let standard_input = PathBuf::from("-");
         let (Some(data), Some(out), false) = (&self.data, &self.out, self.follow.follow) else {
             let file = NetworkFile::load(&self.network)?;
-            return self.follow.run(self.data.as_ref().unwrap_or(&standard_input), file);
+            return self.follow.run(self.data.as_deref().unwrap_or(Path::new("-")), file);
         };
         let data = input(&data.to_string_lossy()).unwrap_or_else(|_| data.clone());
         for (name, path) in [("data", &data), ("network", &self.network)] {

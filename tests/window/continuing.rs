@@ -136,7 +136,7 @@ fn the_spread_is_shown_while_the_starts_train() {
             && starts.is_some_and(|starts| starts.len() == 3 && starts[0].epochs > 1)
     });
     driver.details();
-    assert!(driver.has("SPREAD OVER 3 RESTARTS") && driver.has("0 of 3 restarts ended"));
+    assert!(driver.has("SPREAD OVER 3 RESTARTS"));
     driver.click("■ Stop");
     ended(&mut driver);
     let settings = RunSettings {

@@ -99,7 +99,6 @@ fn the_decoders_figures_are_the_librarys() {
 
     // The next training is measured automatically once it has ended.
     driver.click_button("Known");
-    driver.click("Noise on resistance");
     driver.enter("Relative noise", "0.1");
     assert_eq!(driver.state().draft, noisy());
     driver.train();

@@ -169,7 +169,8 @@ fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
     let of_tables = nodes.filter(|node| {
         let node = node.accesskit_node();
         let is_sorting = || node.label().is_some_and(|label| label.starts_with("Sort by "));
-        matches!(node.role(), Role::Cell | Role::ColumnHeader) || is_sorting()
+        let is_cell = matches!(node.role(), Role::Cell | Role::ColumnHeader) || is_sorting();
+        is_cell && node.bounding_box().is_some()
     });
     let cells = Vec::from_iter(of_tables.map(|node| node.rect().expand(2.0)));
     let mut cuts = BTreeSet::new();

@@ -151,3 +151,17 @@ fn undo_says_what_it_undid_and_shows_it() {
     driver.settle();
     assert!(driver.says("Undone: preset Best accuracy"), "{:#?}", driver.texts());
 }
+
+#[test]
+fn in_a_narrow_window_the_settings_are_hidden_until_asked_for() {
+    let mut driver = Driver::open();
+    driver.harness().set_size(vec2(686.0, 457.0));
+    driver.settle();
+    assert!(!driver.has("Hidden nodes"));
+    driver.click("Show or hide the settings");
+    driver.settle();
+    assert!(driver.has("Hidden nodes"));
+    driver.act("Show or hide the settings");
+    driver.settle();
+    assert!(!driver.has("Hidden nodes"));
+}

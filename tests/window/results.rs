@@ -58,7 +58,8 @@ fn a_training_shows_the_same_errors_as_the_library() {
 fn targets_with_positions_are_shown_as_surfaces() {
     let Opened { mut driver, folder, .. } = trained_on(|folder| skin_with_positions(folder, GRID));
     assert!(
-        driver.has("d1 (mm) against time (s): 90 % interval, actual, decoded"),
+        driver.says("d1 (mm) against time (s): actual, decoded")
+            || driver.says("d1 (mm) against time (s): 90 % interval"),
         "all targets over time first"
     );
     driver.click("Surfaces");
@@ -367,12 +368,7 @@ fn the_wheel_zooms_the_values_over_time_and_a_click_goes_to_a_sample() {
     let whole = driver.get(x).accesskit_node().description().unwrap();
     let middle = driver.get(x).rect().center();
     driver.harness().hover_at(middle);
-    driver.harness().run_steps(2);
-    assert!(
-        driver.texts().iter().any(|text| text.contains("x (mm): actual ")),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.wait("the values there", |driver| driver.says("x (mm): actual "));
     driver.harness().drag_at(middle);
     driver.harness().drop_at(middle);
     driver.settle();
@@ -388,4 +384,40 @@ fn the_wheel_zooms_the_values_over_time_and_a_click_goes_to_a_sample() {
     driver.settle();
     let seen = driver.get(x).accesskit_node().description().unwrap();
     assert_ne!(seen, whole, "fewer samples are in view");
+}
+
+#[test]
+fn a_number_that_means_none_is_mended_by_a_button() {
+    let folder = tempfile::tempdir().unwrap();
+    let setup = probe(folder.path());
+    let path = folder.path().join("probe.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let spoiled = text.lines().enumerate().map(|(line, text)| match line {
+        40..=50 => format!(
+            "{},-999,{}",
+            text.rsplitn(3, ',').nth(2).unwrap(),
+            text.rsplit(',').next().unwrap()
+        ),
+        _ => text.to_owned(),
+    });
+    fs::write(&path, Vec::from_iter(spoiled).join("\n")).unwrap();
+    let mut driver = Driver::open();
+    driver.take_recording(&setup);
+    driver.train();
+    driver.wait("the inspected file", |driver| {
+        driver.says("x has −999 where other values are far away")
+    });
+    driver.click("Treat −999 as missing");
+    let markers = |driver: &Driver| {
+        let run = driver.state().run.as_ref().unwrap();
+        Vec::from_iter(run.setup.plan().unwrap().import.missing.iter().map(ToString::to_string))
+    };
+    driver.wait("the next training", |driver| markers(driver) == ["x=-999"]);
+    driver.wait_for_last_epoch();
+    assert!(!driver.says("where other values are far away"));
+    assert_eq!(
+        driver.state().run.as_ref().unwrap().test.set.samples(),
+        22,
+        "a fifth of the other rows"
+    );
 }

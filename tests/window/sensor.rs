@@ -96,7 +96,6 @@ fn rows_that_mirror_each_other_are_reported_until_the_row_is_known() {
 #[test]
 fn noise_that_hides_everything_is_reported_with_a_remedy() {
     let mut driver = open();
-    driver.unfold_to("Noise on resistance", "Relative noise");
     driver.enter("Relative noise", "0.1");
     wait_for_the_answer(&mut driver);
     let texts = driver.texts();

@@ -9,7 +9,7 @@ mod training;
 
 pub use network::{hidden_ui, workload_ui};
 pub use presets::{follow_preset, preset_between, preset_ui};
-pub use scene::{SAMPLES, of_samples, of_scene, scene_ui, size_ui};
+pub use scene::{SAMPLES, of_samples, of_scene, scene_ui};
 pub use sensor::{array_ui, geometry_ui};
 pub use training::method_ui;
 

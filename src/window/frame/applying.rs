@@ -17,7 +17,7 @@ use crate::window::{
     training_worker::{LOST, Origin, Request, RunView, TrainedRun},
     views::CHECKPOINT,
 };
-use decoupler_core::evaluation::RunSettings;
+use decoupler_core::{evaluation::RunSettings, training::StopReason};
 use decoupler_files::import::Setup;
 
 impl DecouplerWindow {
@@ -163,17 +163,11 @@ impl DecouplerWindow {
                 run.asked = asked;
             }
         }
-        let setup = run.setup.clone();
-        shared.run = Some(run);
-        shared.phase = shared.phase_at_rest();
+        let reason = run.stop_reason.unwrap_or(StopReason::Stopped);
+        self.show_run(run, Phase::Ended(reason), is_chosen);
         if is_chosen {
             self.opened = None;
-            self.take_setup(&setup);
             self.show(ViewKind::Train);
-        }
-        self.share_plan();
-        if self.shared.source == SourceKind::Array {
-            self.request_preview();
         }
     }
 

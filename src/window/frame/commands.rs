@@ -8,11 +8,11 @@ use super::{
     DecouplerWindow,
     help::{Help, Page},
     modal::{Modal, Palette},
+    top_bar::SMALL,
 };
 use crate::window::{
     forms::preset_between,
     shared::{Command, Effect, Look, Matter, Notice, Offer, Offers, RecordingDraft, Shared, SourceKind, ViewKind},
-    test_view::HeightScale,
 };
 
 /// Interface scales offered to the user, relative to the default.
@@ -69,10 +69,6 @@ impl DecouplerWindow {
         let is_free = !shared.phase.is_busy();
         let drafts = drafts(shared);
         let scale = self.ctx.zoom_factor();
-        let heights = match look.heights {
-            HeightScale::Stroke => ("Free the scale of heights", HeightScale::Fitted),
-            HeightScale::Fitted => ("Lock the scale of heights", HeightScale::Stroke),
-        };
         let mut commands = vec![
             (Command::Undo, is_free && self.undoer.has_undo(&drafts)),
             (Command::Redo, is_free && self.undoer.has_redo(&drafts)),
@@ -81,14 +77,10 @@ impl DecouplerWindow {
         commands.push((if look.is_dark { Command::Light } else { Command::Dark }, true));
         commands.extend(SequentialMap::ALL.map(|map| (Command::Colours(map), map != look.colours)));
         commands.extend([
-            (Command::Scale(heights.0, heights.1, look.error_limit_mm), true),
-            (
-                Command::Scale("Free the scale of errors", look.heights, None),
-                look.error_limit_mm.is_some(),
-            ),
             (Command::Larger, scale < *SCALES.end() - 0.5 * STEP),
             (Command::Smaller, scale > *SCALES.start() + 0.5 * STEP),
             (Command::UsualSize, (scale - 1.0).abs() > 0.5 * STEP),
+            (Command::Form, self.ctx.content_rect().width() < SMALL),
             (Command::Search, true),
             (Command::Keys, true),
             (Command::Glossary, true),
@@ -115,14 +107,10 @@ impl DecouplerWindow {
                 self.look(Look { is_dark, ..look });
             }
             &Command::Colours(colours) => self.look(Look { colours, ..look }),
-            &Command::Scale(_, heights, error_limit_mm) => self.look(Look {
-                heights,
-                error_limit_mm,
-                ..look
-            }),
             Command::Larger => self.set_scale(self.ctx.zoom_factor() + STEP),
             Command::Smaller => self.set_scale(self.ctx.zoom_factor() - STEP),
             Command::UsualSize => self.set_scale(1.0),
+            Command::Form => self.shows_form ^= true,
             Command::Search => self.modal = Some(Modal::Palette(Palette::default())),
             Command::Keys => self.modal = Some(Modal::Help(Help::open(Page::Keys, ""))),
             Command::Glossary => self.modal = Some(Modal::Help(Help::open(Page::Glossary, ""))),

@@ -185,8 +185,7 @@ fn palette_ui(ui: &Ui, palette: &mut Palette, offers: &[Offer]) -> Option<Reply>
 /// Returns the commands that contain the typed words in any order in their names, those that contain them in their hints,
 /// and the terms of the glossary with these words; available commands come first.
 fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
-    let words: Vec<_> = typed.split_whitespace().map(str::to_lowercase).collect();
-    let has_words = |text: &str| words.iter().all(|word| text.to_lowercase().contains(word));
+    let has_words = |text: &str| glossary::has_words(text, typed);
     let mut found = Vec::new();
     for Offer {
         command,
@@ -213,7 +212,7 @@ fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
     }
     found.sort_by_key(|(rank, _)| *rank);
     let terms = glossary::groups().into_iter().flat_map(|(_, terms)| terms);
-    let terms = terms.filter(|term| !words.is_empty() && has_words(term.name));
+    let terms = terms.filter(|term| !typed.trim().is_empty() && has_words(term.name));
     let terms = terms.map(|term| Line {
         name: term.name.to_owned(),
         right: "Glossary".to_owned(),

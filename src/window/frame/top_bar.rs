@@ -12,8 +12,8 @@ const WIDE: f32 = 1280.0;
 /// Width below which the names of the views are closer together.
 const TIGHT: f32 = 1100.0;
 
-/// Width below which only what has no keys is left.
-const SMALL: f32 = 800.0;
+/// Width below which the column on the left is hidden at first, and only what has no keys is left.
+pub(super) const SMALL: f32 = 800.0;
 
 /// Name, views, and at the right end the tools of the displayed view, before those of the window itself. Returns the command that the user clicked.
 pub(super) fn top_bar_ui(
@@ -39,7 +39,8 @@ pub(super) fn top_bar_ui(
             let views = ViewKind::ALL.map(|view| (view, view.name()));
             segmented_ui(ui, "View", &views, shown, false)
         };
-        let picked = ui.scope(views_ui).inner.map(Command::Show);
+        let form = (width < SMALL).then(|| command_button_ui(ui, offers, Command::Form, "☰"));
+        let picked = ui.scope(views_ui).inner.map(Command::Show).or(form.flatten());
         // They keep the order of reading, which the Tab key follows; their width is that of the frame before.
         let id = Id::unique("width of the tools");
         let before = ui.data(|data| data.get_temp(id)).unwrap_or(0.0);

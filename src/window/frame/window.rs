@@ -1,6 +1,5 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
-use decoupler_files::export::exit_leaving_nothing;
 use eframe::egui::{
     self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder, ViewportCommand, vec2,
 };
@@ -12,21 +11,16 @@ use super::{
     modal::Modal,
     notices::Notices,
     remembered::{Memory, Remembered, WindowFile},
-    top_bar::top_bar_ui,
+    top_bar::{SMALL, top_bar_ui},
 };
-use crate::{
-    signals::on_termination,
-    window::{
-        job::{Background, Wake},
-        preview::PreviewEvent,
-        shared::{
-            Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status,
-        },
-        theme::{self, Theme, space},
-        training_worker::{Request, Worker},
-        views::Views,
-        widgets::focus_ring_ui,
-    },
+use crate::window::{
+    job::{Background, Wake},
+    preview::PreviewEvent,
+    shared::{Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
+    theme::{self, Theme, space},
+    training_worker::{Request, Worker},
+    views::Views,
+    widgets::focus_ring_ui,
 };
 
 /// A picture to be copied, and the message for the user.
@@ -65,6 +59,8 @@ pub struct DecouplerWindow {
     pub(super) given: Vec<PathBuf>,
     /// True until the first frame.
     is_new: bool,
+    /// True while the column on the left is shown in a narrow window too.
+    pub(super) shows_form: bool,
 }
 
 impl DecouplerWindow {
@@ -125,6 +121,7 @@ impl DecouplerWindow {
             ctx: ctx.clone(),
             given: Vec::new(),
             is_new: true,
+            shows_form: false,
         };
         if let Some(damage) = damage {
             window.notices.fail(Matter::Memory, damage);
@@ -158,15 +155,6 @@ impl DecouplerWindow {
         if let Some((folder, interval)) = &self.keeping {
             self.worker.ask(Request::Keep(folder.clone(), *interval));
         }
-    }
-
-    /// Saves the running training and ends the program on SIGTERM and SIGHUP, even if the window does not respond.
-    pub(super) fn save_on_termination(&self) {
-        let save = self.worker.saver();
-        on_termination(move |status| {
-            save();
-            exit_leaving_nothing(i32::from(status));
-        });
     }
 
     /// State that all views read.
@@ -233,12 +221,15 @@ impl DecouplerWindow {
             .show(ui, |ui| ui.max_rect());
         // A narrow window does not change the width in a wide one.
         let is_narrow = ui.available_width() < 1400.0;
-        let form = Panel::left(if is_narrow { "narrow form" } else { "form" })
-            .default_size(self.chosen.form_points.unwrap_or(space(68)))
-            .size_range(within(form_min, space(110), for_form))
-            .frame(panel(side))
-            .show(ui, |ui| view.form_ui(&mut inside(ui), shared, &mut effects));
-        if !is_narrow {
+        let shows_form = self.shows_form || ui.available_width() >= SMALL;
+        let form = shows_form.then(|| {
+            Panel::left(if is_narrow { "narrow form" } else { "form" })
+                .default_size(self.chosen.form_points.unwrap_or(space(68)))
+                .size_range(within(form_min, space(110), for_form))
+                .frame(panel(side))
+                .show(ui, |ui| view.form_ui(&mut inside(ui), shared, &mut effects))
+        });
+        if let Some(form) = form.filter(|_| !is_narrow) {
             self.chosen.form_points = Some(form.response.rect.width());
         }
         let report = has_report.then(|| {
@@ -265,7 +256,7 @@ impl DecouplerWindow {
         let focused = ui.memory(|memory| memory.focused());
         let focused = focused.and_then(|id| ui.ctx().read_response(id));
         // The edge of a column.
-        if let Some(edge) = focused.filter(|focused| focused.rect.height() >= form.response.rect.height()) {
+        if let Some(edge) = focused.filter(|focused| focused.rect.height() >= middle.response.rect.height()) {
             focus_ring_ui(ui, &edge);
         }
         if changes_something(ui.ctx()) || !effects.is_empty() {

@@ -3,8 +3,8 @@
 
 use decoupler_files::figure::{Form, Ink, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Scale, Series};
 use eframe::egui::{
-    Color32, FontId, Id, Label, Popup, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2,
-    WidgetInfo, accesskit::Role,
+    Color32, FontId, Id, Label, Painter, Popup, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, TextWrapMode,
+    Ui, UiBuilder, Vec2, WidgetInfo, accesskit::Role,
 };
 use egui_plot::{
     AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, FilledArea, GridInput, GridMark, HLine, HoverPosition, Line,
@@ -180,7 +180,9 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
         ui.spacing_mut().item_spacing.x = space(1);
         for (name, look) in keys {
             // A line and its name stay together.
-            if ui.available_size_before_wrap().x < 1.2 * measure(ui.painter(), name).x + space(7) {
+            let width = 1.2 * measure(ui.painter(), name).x + space(7);
+            let whole = width <= ui.max_rect().width();
+            if ui.available_size_before_wrap().x < width {
                 ui.end_row();
             }
             let (place, _) = ui.allocate_exact_size(Vec2::splat(space(4)), Sense::hover());
@@ -189,7 +191,11 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
                 palette,
                 &look.sample(to_glam(place.left_center()), place.width()),
             );
-            ui.add(Label::new(RichText::new(name).size(type_size().note).color(palette.dim)).extend());
+            let name = Label::new(RichText::new(name).size(type_size().note).color(palette.dim));
+            ui.add(name.wrap_mode(match whole {
+                true => TextWrapMode::Extend,
+                false => TextWrapMode::Truncate,
+            }));
             ui.add_space(space(2));
         }
     });
@@ -201,10 +207,15 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransf
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
-    let axis_hints = |hints: AxisHints<'static>, axis: &PlotAxis, apart: f32| {
+    let painter = ui.painter().clone();
+    let axis_hints = |hints: AxisHints<'static>, (axis, length): (&PlotAxis, f32), apart: f32| {
         let described = axis.clone();
         hints
-            .label(RichText::new(&axis.name).size(type_size().small).color(palette.dim))
+            .label(
+                RichText::new(shortened(&painter, &axis.name, length))
+                    .size(type_size().small)
+                    .color(palette.dim),
+            )
             .formatter(move |mark, _| described.tick_text(mark.value, mark.step_size))
             // Numbers have full brightness wherever they fit.
             .label_spacing(Rangef::new(apart, apart + 1.0))
@@ -213,7 +224,7 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransf
     };
     // Plots below each other are moved together by whoever draws them.
     let may_move = track.is_none();
-    let mut y_hints = axis_hints(AxisHints::new_y(), &plot.y, 12.0);
+    let mut y_hints = axis_hints(AxisHints::new_y(), (&plot.y, space.y), 12.0);
     if track.is_some() {
         // The names are beside the plots, and their frames are below each other.
         y_hints = y_hints.label("").min_thickness(NUMBERS);
@@ -224,7 +235,7 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransf
         .id(id)
         .width(space.x)
         .height(space.y)
-        .custom_x_axes(vec![axis_hints(AxisHints::new_x(), &plot.x, 24.0)])
+        .custom_x_axes(vec![axis_hints(AxisHints::new_x(), (&plot.x, space.x), 24.0)])
         .custom_y_axes(vec![y_hints])
         .show_axes([track != Some(false), plot.y.scale != Scale::Hidden])
         .x_grid_spacer(|input| marks(&plot.x, &input, NUMBER[0]))
@@ -271,6 +282,15 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransf
     let labels = plot.lay_out_labels(bounds(frame), at, &|text| measure(ui.painter(), text));
     paint_over(ui, frame, &labels);
     (shown.transform, shown.response)
+}
+
+/// Returns the beginning of a name that fits into this length of an axis, apart from the numbers of the other.
+fn shortened(painter: &Painter, name: &str, length: f32) -> String {
+    let fits = |text: &str| measure(painter, text).x <= length - NUMBERS;
+    let ends = name.char_indices().map(|(end, _)| end).rev();
+    let shorter = ends.map(|end| format!("{}…", name[..end].trim_end()));
+    let mut texts = std::iter::once(name.to_owned()).chain(shorter);
+    texts.find(|text| fits(text)).unwrap_or_default()
 }
 
 /// Returns the visible ticks.

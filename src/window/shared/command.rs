@@ -4,10 +4,9 @@ use decoupler_files::figure::SequentialMap;
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
 use super::ViewKind;
-use crate::window::test_view::HeightScale;
 
 /// Something that the user can do by a key, or by picking it from the list of all commands.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
     // Of the Train view.
     Train,
@@ -40,10 +39,10 @@ pub enum Command {
     Dark,
     Light,
     Colours(SequentialMap),
-    Scale(&'static str, HeightScale, Option<f64>),
     Larger,
     Smaller,
     UsualSize,
+    Form,
     Search,
     Keys,
     Glossary,
@@ -112,10 +111,14 @@ impl Command {
             Self::Dark => ("Dark theme", None, ""),
             Self::Light => ("Light theme", None, ""),
             Self::Colours(map) => (map.name(), None, map.meaning()),
-            Self::Scale(name, ..) => (*name, None, "Colours of the displayed heights or errors."),
             Self::Larger => ("Larger interface", ctrl(Key::Plus), "Zoom in."),
             Self::Smaller => ("Smaller interface", ctrl(Key::Minus), "Zoom out."),
             Self::UsualSize => ("Reset the interface size", ctrl(Key::Num0), "Zoom to 100 %."),
+            Self::Form => (
+                "Show or hide the settings",
+                None,
+                "In a narrow window they are hidden at first.",
+            ),
             Self::Search => ("Search actions", ctrl(Key::K), ""),
             Self::Keys => ("Keys", plain(Key::Questionmark), "Help: every shortcut."),
             Self::Glossary => ("Glossary", None, "Help: every term."),
@@ -146,7 +149,7 @@ impl About {
 }
 
 /// A command that is listed now.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Offer {
     /// The command.
     pub command: Command,

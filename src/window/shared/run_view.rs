@@ -111,13 +111,6 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
             TestErrors::Targets(_) => format!("error {} of range", format_percent(result.errors.percent())),
         },
     ];
-    if run.settings().starts > 1 && phase.is_busy() {
-        parts.push(format!(
-            "{} of {} restarts ended",
-            result.starts_ended,
-            run.settings().starts
-        ));
-    }
     if let Some(time) = result.wall_time
         && epochs_run > 0
     {

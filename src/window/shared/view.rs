@@ -33,7 +33,7 @@ pub trait View: Debug {
     /// Shows its tools at the right of the top bar.
     fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Shows its column on the left.
+    /// Shows its column on the left; not called while that is hidden in a narrow window.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
     /// Shows its column on the right, where [`Shared::has_report`] is true.

@@ -2,7 +2,7 @@ use std::{
     cell::Cell,
     path::PathBuf,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc,
         atomic::{AtomicU64, Ordering},
         mpsc::{Sender, channel},
     },
@@ -202,8 +202,6 @@ pub struct RunResult {
     pub defect: Option<String>,
     /// Number of epochs of the start that is furthest ahead.
     pub epochs_run: usize,
-    /// Number of starts that have ended.
-    pub starts_ended: usize,
     /// Wall-clock time of the training, with all starts in parallel, if known.
     pub wall_time: Option<Duration>,
     /// Decoding time of one snapshot, measured when the training pauses or ends.
@@ -248,8 +246,7 @@ pub fn furthest_epoch(run: &Run) -> usize {
 pub struct Worker {
     // Dropped first: a thread that finds no one to send requests must know that it is cancelled.
     job: Background<Event>,
-    /// Shared with the thread that waits for signals.
-    requests: Arc<Mutex<Sender<Request>>>,
+    requests: Sender<Request>,
     keeping: Keeping,
     /// The training that is being prepared.
     awaited: Cell<Option<RunId>>,
@@ -269,7 +266,7 @@ impl Worker {
             |ended| Event::Died(ended.err()),
         );
         Self {
-            requests: Arc::new(Mutex::new(requests)),
+            requests,
             job,
             keeping,
             awaited: Cell::default(),
@@ -284,14 +281,7 @@ impl Worker {
 
     /// Starts another thread after this one has died.
     pub fn restart(&mut self, wake: Wake) {
-        let new = Self::start(wake);
-        let requests = Arc::clone(&self.requests);
-        *self.requests() = new.requests().clone();
-        *self = Self { requests, ..new };
-    }
-
-    fn requests(&self) -> MutexGuard<'_, Sender<Request>> {
-        self.requests.lock().unwrap_or_else(PoisonError::into_inner)
+        *self = Self::start(wake);
     }
 
     /// Removes the checkpoint of the running training, which the user leaves unfinished, and keeps none from now on.
@@ -299,19 +289,13 @@ impl Worker {
         self.keeping.forget();
     }
 
-    /// Returns a function that saves the running training and waits until it is saved.
-    pub fn saver(&self) -> impl Fn() + Send + use<> {
+    /// Saves the running training and waits until it is saved.
+    pub fn save(&self) {
         /// An epoch may take longer; its training is then as old as the last checkpoint.
         const LONGEST_SAVE: Duration = Duration::from_secs(5);
-        let requests = Arc::clone(&self.requests);
-        move || {
-            let (done, saved) = channel();
-            let requests = requests.lock().unwrap_or_else(PoisonError::into_inner);
-            // If the thread has died, there is nothing to save.
-            let _ = requests.send(Request::Save(done));
-            drop(requests);
-            let _ = saved.recv_timeout(LONGEST_SAVE);
-        }
+        let (done, saved) = channel();
+        self.ask(Request::Save(done));
+        let _ = saved.recv_timeout(LONGEST_SAVE);
     }
 
     /// Begins a training. Others that are being prepared are cancelled.
@@ -329,7 +313,7 @@ impl Worker {
             self.newest.store(RunId::new().0, Ordering::Relaxed);
         }
         // The receiver is dropped only if the worker died.
-        let _ = self.requests().send(request);
+        let _ = self.requests.send(request);
     }
 
     /// Returns true while a training is being prepared and not cancelled.
@@ -362,7 +346,7 @@ mod tests {
         /// Returns a worker whose thread panics; `wake` is called afterwards.
         pub fn dying(wake: Wake) -> Self {
             let mut dead = Self::start(wake);
-            *dead.requests() = channel().0;
+            dead.requests = channel().0;
             dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
             dead
         }

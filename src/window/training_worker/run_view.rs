@@ -1,4 +1,4 @@
-use std::{ops::Deref, sync::Arc, time::Duration};
+use std::{ops::Deref, path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
     dataset::{Dataset, SplitBy},
@@ -6,6 +6,7 @@ use decoupler_core::{
         Baselines, ErrorTable, PublishedErrors, RunSettings, Scores, StartRecord, auto::AutoRecord, frame_us,
         recorded::Determination,
     },
+    job::Job,
     problem::Problem,
     training::{EpochRecord, Stage, StopReason},
 };
@@ -21,7 +22,10 @@ use super::{
     message::{Progress, RunId, RunResult, TrainedRun, append_epochs},
     past_networks::PastNetworks,
 };
-use crate::window::test_view::{TestView, TestViewError};
+use crate::window::{
+    test_view::{TestView, TestViewError},
+    timeline::Timeline,
+};
 
 /// Plan of a recording, which the settings, the training and the file of the window share: comparing it costs nothing.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -130,11 +134,21 @@ impl RunView {
     /// # Errors
     /// If it cannot be drawn or read.
     pub fn kept(name: String, file: Arc<NetworkFile>) -> Result<Self, String> {
-        let set = file.test_set().map_err(|error| error.to_string())?;
+        let (set, timeline) = match &file.recorded {
+            None => (file.test_set().map_err(|error| error.to_string())?, None),
+            Some(recorded) => {
+                let sets = file.setup().sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ());
+                let sets = sets.and_then(|sets| sets.check_saved(Some(recorded)).map(|()| sets));
+                let sets = sets.map_err(|error| error.to_string())?;
+                let timeline = |of| Arc::new(Timeline::of(of, file.settings.seed));
+                (sets.sets.test, sets.recordings.as_ref().map(timeline))
+            }
+        };
         let plan = file.recorded.as_ref().map(|recorded| &recorded.plan);
         let order = plan.map_or(SplitBy::Time, Plan::test_order);
         let test = TestView::new(Arc::clone(&set), Arc::new(file.problem.clone()), order);
-        let test = test.map_err(|error| error.to_string())?;
+        let mut test = test.map_err(|error| error.to_string())?;
+        test.timeline = timeline.unwrap_or(test.timeline);
         let answers = file.decoder().answers_to(&set);
         let mut outline = EpochOutline::default();
         outline.extend(&file.training.history);
@@ -152,7 +166,6 @@ impl RunView {
             best_epoch: training.best_epoch,
             defect: None,
             epochs_run: training.epochs,
-            starts_ended: training.starts.len(),
             wall_time: None,
             frame_time: frame_time.map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
             is_idle: true,

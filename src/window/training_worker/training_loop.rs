@@ -395,7 +395,6 @@ impl Training {
         let frame_time = is_idle
             .then(|| frame_us(&mut networks.decoder(), run.test()).ok())
             .flatten();
-        let ended = run.trainers().iter().filter(|start| start.stop_reason().is_some());
         let progress = Progress {
             epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
             stages: trainer.stages().to_vec(),
@@ -416,7 +415,6 @@ impl Training {
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),
-                starts_ended: ended.count(),
                 wall_time: run.wall_time(),
                 frame_time: frame_time.map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
                 is_idle,

@@ -63,12 +63,12 @@ impl View for CompareView {
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        self.fill_sides(&shared.runs, effects);
         run_list_ui(ui, shared, &mut self.removing, effects);
     }
 
     /// Shows the surfaces of both runs above, their curves and figures below.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
+        self.fill_sides(&shared.runs, effects);
         let whole = ui.available_rect_before_wrap();
         let gap = space(2);
         let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));

@@ -320,12 +320,12 @@ impl View for StudyView {
         self.exports(shared.look.colours)
     }
 
-    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn form_ui(&mut self, ui: &mut Ui, _shared: &Shared, effects: &mut Vec<Effect>) {
         scrolled_ui(ui, "study form", |ui| self.fields_ui(ui, effects));
-        self.check(shared);
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
+        self.check(shared);
         let whole = ui.available_rect_before_wrap();
         let mut look = self.look;
         match (self.displayed(), &self.task) {

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use decoupler_core::{
-    dataset::SplitBy,
     evaluation::{Combination, ErrorTable, Errors, Scores, Spread, StartRecord, TestErrors, best_start, error_remarks},
     identifiability::Identifiability,
     text::counted,
@@ -19,7 +18,7 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Button, Frame, Layout, Margin, Response, RichText, Stroke, Ui, WidgetInfo, accesskit::Role};
 
-use super::{decoders::decoders_ui, press::press_section_ui, recording::bias, view::TrainView};
+use super::{decoders::decoders_ui, press::press_section_ui, view::TrainView};
 use crate::window::{
     glossary,
     shared::{
@@ -288,7 +287,7 @@ fn verdict_ui(
     effects: &mut Vec<Effect>,
 ) -> Vec<String> {
     let cures = view.recording.cures(shared).into_iter();
-    let cures = cures.map(|(text, button, effect)| (text, Some((button, vec![effect, Effect::Train]))));
+    let cures = cures.map(|(text, button, effects)| (text, Some((button, effects))));
     let mut remarks = Vec::<Remark>::from_iter(cures);
     remarks.extend(result.defect.as_ref().map(|defect| (capitalised(defect), None)));
     let praise = match (result.errors.nodes(), run.baselines.linear.nodes()) {
@@ -358,10 +357,6 @@ fn of_targets(run: &RunView, result: &RunResult, remarks: &mut Vec<Remark>) -> O
     }
     // What has a button comes first.
     remarks.sort_by_key(|(_, cure)| cure.is_none());
-    let plan = run.setup.plan();
-    if plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random) {
-        remarks.push((bias(SplitBy::Random).to_owned(), None));
-    }
     let (low, high) = extreme(f64::min).zip(extreme(f64::max))?;
     let times = if low == high { low } else { format!("{low} to {high}") };
     let holds = match result.coverage.iter().any(Option::is_some) {

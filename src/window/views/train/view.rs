@@ -242,7 +242,9 @@ impl TrainView {
             }
         }
         let width = match is_narrow {
-            true => (0.45 * lower.width()).clamp(space(82), space(96)),
+            true => (0.45 * lower.width())
+                .clamp(space(82), space(96))
+                .min(0.6 * lower.width()),
             false => (0.4 * lower.width()).floor(),
         };
         let (mut charts, beside) = lower.split_left_right_at_x(lower.right() - width);
