@@ -2,7 +2,11 @@
 //! description, no text is cut off at its side. `PICTURES=FOLDER cargo test --test window every_view` also writes a
 //! picture of each view at each size in both themes.
 
-use std::{collections::BTreeSet, env, fs, path::PathBuf};
+use std::{
+    collections::BTreeSet,
+    env, fs,
+    path::{Path, PathBuf},
+};
 
 use decoupler::window::SourceKind;
 use eframe::egui::{
@@ -15,11 +19,15 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::{
     driver::Driver,
+    live::number,
     sources::{BOTH, trained_small},
 };
 
 /// The views, as named in the top bar.
 pub(crate) const VIEWS: [&str; 5] = ["Train", "Study", "Compare", "Sensor", "Live"];
+
+/// The Live view once it has decoded.
+const DECODED: &str = "Live, decoded";
 
 /// Sizes of the window in pixels.
 const SIZES: [Vec2; 4] = [
@@ -69,8 +77,11 @@ fn every_view_is_named_described_and_whole() {
     for source in BOTH {
         let mut opened = trained_small(source);
         let driver = &mut opened.driver;
-        for view in VIEWS {
-            show(driver, view);
+        for view in VIEWS.into_iter().chain([DECODED]) {
+            show(driver, view.split(',').next().unwrap());
+            if view == DECODED {
+                decode(driver, source, opened.folder.path());
+            }
             let place = format!("{view}, {}", name_of(source));
             for tab in tabs(driver) {
                 driver.click(&tab);
@@ -100,6 +111,18 @@ fn every_view_is_named_described_and_whole() {
         }
     }
     assert!(faults.is_empty(), "{faults:#?}");
+}
+
+/// Decodes some frames of the source.
+fn decode(driver: &mut Driver, source: SourceKind, folder: &Path) {
+    if source == SourceKind::Recording {
+        driver.type_into("File", &folder.join("probe.csv").display().to_string());
+        driver.settle();
+    }
+    driver.click("▶ Start");
+    driver.wait("frames", |driver| number(driver, "Decoded: ") > 30.0);
+    driver.click("■ Stop");
+    driver.settle();
 }
 
 fn name_of(source: SourceKind) -> &'static str {

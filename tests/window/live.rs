@@ -27,7 +27,6 @@ use glam::DVec3;
 use crate::{
     driver::Driver,
     sources::{probe, with_epochs},
-    typing::double_click_slider,
 };
 
 /// The window with a small network in its run list, at the Live view.
@@ -99,7 +98,7 @@ fn record(path: &Path, file: &NetworkFile, motion: Motion, faults: impl IntoIter
 /// Replays a file.
 fn replay(driver: &mut Driver, path: &Path) {
     driver.click_button("Replay");
-    driver.type_into("Frames", &path.display().to_string());
+    driver.type_into("File", &path.display().to_string());
     driver.settle();
     start(driver);
 }
@@ -126,7 +125,7 @@ fn without_a_network_one_click_trains_one_and_another_decodes_live() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.click_button("Live");
-    assert!(driver.has("No network yet") && !driver.is_enabled("▶ Start"));
+    assert!(driver.says("needs a trained network") && !driver.is_enabled("▶ Start"));
     driver.click("Train a network now");
     assert_eq!(driver.shown(), "Train");
     driver.wait("the run", |driver| {
@@ -134,7 +133,7 @@ fn without_a_network_one_click_trains_one_and_another_decodes_live() {
     });
     driver.click_button("Live");
     driver.enter("Relative noise", "0");
-    driver.click("Start this source");
+    driver.click("▶ Start");
     driver.wait("surfaces and readings", |driver| {
         ["Live decoded surface", "Live actual surface", "Live readings"]
             .iter()
@@ -259,7 +258,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     let recording = read(&recordings(folder.path())[0], &driver.kept(1));
 
     driver.click("Replay recording");
-    let ended = |driver: &Driver| driver.has("Replay paused");
+    let ended = |driver: &Driver| driver.has("Replay ended: press Play to see it again");
     let replayed = collect(&mut driver, "the end of the replay", ended);
     assert!(driver.becomes_idle(), "a replay that is paused");
     let file = driver.kept(1);
@@ -283,22 +282,26 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     let (frame, last) = check(&driver, 1);
     assert_eq!(frame, last);
 
-    driver.get("Replay speed").set_value_accesskit(4.0);
+    driver.click("4×");
+    driver.get("Replay position").set_value_accesskit(0.0);
     driver.harness().run_steps(2);
-    assert!(driver.has("4.0×"), "{:#?}", driver.texts());
-    double_click_slider(&mut driver, "Replay speed");
-    assert!(driver.has("1.0×"), "{:#?}", driver.texts());
-    double_click_slider(&mut driver, "Replay position");
     driver.wait("the first frame", |driver| driver.says("0.00 of "));
     assert_eq!(check(&driver, 1).0, 0);
-    let name = driver.state().runs.workspace.runs[0].name.clone();
-    pick(&mut driver, "Decode with", &name);
+    let [name, other] = [0, 1].map(|run: usize| driver.state().runs.workspace.runs[run].name.clone());
+    driver.click("Decode with");
+    driver.type_into("Search runs", &name.to_uppercase());
+    assert!(!driver.has(&other), "it is not among those that were searched");
+    driver.click(&name);
     driver.wait("the other network's answer", |driver| {
         driver.says(&format!("{name}, '")) && driver.has("Decoded: 1")
     });
     assert_eq!(check(&driver, 0).0, 0);
     driver.click("■ Stop");
     driver.settle();
+    assert!(driver.has("Live decoded surface"));
+    pick(&mut driver, "Decode with", &format!("Newest run: {other}"));
+    driver.settle();
+    assert!(!driver.has("Live decoded surface"), "it is of another network");
     let copy = folder.path().join("copy.csv");
     driver.save("Recording, CSV", &copy);
     assert_eq!(read(&copy, &file), recording);
@@ -380,17 +383,18 @@ fn a_socket_is_decoded_and_its_bad_lines_and_end_are_reported() {
     assert!(!driver.has("Live actual surface"), "the actual surface is unknown");
     driver.wait("silence", |driver| driver.has("No frame for two seconds"));
     assert!(driver.becomes_idle(), "nothing comes");
-    drop(sender);
-    driver.wait("the end", |driver| driver.says("The source has ended."));
-    assert!(driver.is_enabled("▶ Start"));
-
+    driver.click("■ Stop");
+    drop((sender, listener));
     driver.click("▶ Start");
-    drop(listener);
-    driver.wait("the end of the source", |driver| !driver.is_enabled("■ Stop"));
+    driver.wait("the failure", |driver| driver.says("cannot connect"));
+    assert!(
+        driver.is_enabled("▶ Start"),
+        "a source that never sent is not tried again"
+    );
 }
 
 #[test]
-fn a_stream_that_has_ended_or_is_lost_is_connected_again_with_one_click() {
+fn a_lost_connection_is_a_warning_and_is_tried_again() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
     let file = driver.kept(0);
@@ -403,22 +407,24 @@ fn a_stream_that_has_ended_or_is_lost_is_connected_again_with_one_click() {
     let (mut sender, _) = listener.accept().unwrap();
     writeln!(sender, "{line}").unwrap();
     driver.wait("a frame", |driver| driver.has("Decoded: 1"));
-    assert!(!driver.has("Try again"), "it has not ended");
-    drop((sender, listener));
-    driver.wait("the end", |driver| driver.says("The source has ended."));
-
-    driver.click("Try again");
-    driver.wait("the failure", |driver| driver.says("cannot connect"));
-    let listener = TcpListener::bind(address).unwrap();
-    driver.click("Try again");
-    let (mut sender, _) = listener.accept().unwrap();
-    assert!(!driver.says("cannot connect"), "the notice goes with the retry");
+    driver.click("● Record");
     writeln!(sender, "{line}").unwrap();
-    driver.wait("a frame", |driver| driver.has("Decoded: 1"));
-    drop(sender);
-    driver.wait("the end", |driver| driver.has("Try again"));
-    driver.enter("Address", "localhost:1");
-    assert!(!driver.has("Try again"), "another source is not a retry");
+    wait_for_recorded(&mut driver, 1.0);
+    drop((sender, listener));
+    driver.wait("the warning", |driver| driver.says("Connection lost"));
+    driver.wait("an attempt", |driver| driver.says("cannot connect"));
+    assert!(driver.has("Live decoded surface") && driver.is_enabled("■ Stop"));
+
+    let listener = TcpListener::bind(address).unwrap();
+    let (mut sender, _) = listener.accept().unwrap();
+    writeln!(sender, "{line}").unwrap();
+    wait_for_recorded(&mut driver, 2.0);
+    assert!(driver.has("Decoded: 3") && !driver.says("Connection lost"));
+    driver.click("■ Stop");
+    driver.settle();
+    let recording = read(&recordings(folder.path())[0], &file);
+    let [first_s, second_s] = recording.times_s().try_into().unwrap();
+    assert!(second_s - first_s >= 1.0, "the time that was lost is a gap");
 }
 
 #[test]
@@ -471,7 +477,7 @@ fn a_network_of_a_recording_decodes_a_file_by_the_names_of_its_columns() {
     }));
     let path = folder.path().join("live.csv");
     fs::write(&path, reordered.join("\n")).unwrap();
-    driver.type_into("Frames", &path.display().to_string());
+    driver.type_into("File", &path.display().to_string());
     driver.settle();
     driver.click("▶ Start");
     driver.wait("the first sample", |driver| driver.says("Decoded values"));

@@ -4,7 +4,7 @@ use eframe::egui::{Align, Align2, Area, Frame, Id, Label, Layout, Margin, Order,
 
 use super::{DecouplerWindow, files::open_folder};
 use crate::window::{
-    shared::{Effect, Matter, Notice},
+    shared::{Matter, Notice},
     theme::{Theme, space},
     training_worker::{Origin, Request},
 };
@@ -91,8 +91,6 @@ enum Reply {
     Dismiss,
     /// Show the folder of the file that was written.
     OpenFolder,
-    /// Connect again to the stream that has ended.
-    Reconnect,
     /// Resume the training that was cut short.
     Resume,
     /// Discard the training that was cut short.
@@ -104,7 +102,6 @@ impl Reply {
         match self {
             Self::Dismiss => "Dismiss",
             Self::OpenFolder => "Open folder",
-            Self::Reconnect => "Try again",
             Self::Resume => "Resume",
             Self::Discard => "Discard",
         }
@@ -114,14 +111,13 @@ impl Reply {
 impl DecouplerWindow {
     /// Shows the notices over the bottom of `middle`, so that nothing moves under the pointer, and does what the user
     /// answers.
-    pub(super) fn notices_ui(&mut self, ui: &Ui, middle: Rect, effects: &mut Vec<Effect>) {
+    pub(super) fn notices_ui(&mut self, ui: &Ui, middle: Rect) {
         if let Some(seconds) = self.notices.pass(ui.input(|input| input.time)) {
             ui.ctx().request_repaint_after(Duration::from_secs_f64(seconds));
         }
         if self.notices.0.is_empty() {
             return;
         }
-        let can_reconnect = self.views.live.can_retry(&self.shared);
         let mut answered = None;
         let area = Area::new(Id::unique("notices"))
             .order(Order::Middle)
@@ -133,7 +129,6 @@ impl DecouplerWindow {
                 // From right to left.
                 let replies: &[Reply] = match (&entry.notice, entry.matter) {
                     (Notice::Saved(..), _) => &[Reply::Dismiss, Reply::OpenFolder],
-                    (_, Matter::Live) if can_reconnect => &[Reply::Dismiss, Reply::Reconnect],
                     (_, Matter::CutShort) if !self.shared.phase.is_busy() => {
                         &[Reply::Dismiss, Reply::Discard, Reply::Resume]
                     }
@@ -150,7 +145,6 @@ impl DecouplerWindow {
                     open_folder(path);
                 }
             }
-            Reply::Reconnect => self.views.live.start(&self.shared, effects),
             Reply::Resume => {
                 self.notices.settle(Matter::CutShort);
                 self.begin(Origin::Left);

@@ -252,7 +252,7 @@ impl DecouplerWindow {
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
         }
-        self.notices_ui(ui, middle.response.rect, &mut effects);
+        self.notices_ui(ui, middle.response.rect);
         self.apply_all(effects);
         if let Some(command) = top_bar.inner {
             self.carry_out(&command);

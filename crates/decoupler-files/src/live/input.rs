@@ -111,8 +111,8 @@ pub struct LineInput {
     /// Lines, before they are parsed.
     pub lines: Lines,
     parser: LineParser,
-    /// Time at which reading began.
-    begun: Instant,
+    /// Time at which reading began, from which times are counted.
+    pub begun: Instant,
     has_stepped_back: bool,
 }
 

@@ -1,7 +1,5 @@
 //! The cards in the middle: the decoded surfaces, the readings or the values over time, and the figures of the stream.
 
-use std::ops::RangeInclusive;
-
 use decoupler_core::{live::ZeroGains, text::counted};
 use decoupler_files::{
     export::{format_duration, format_number},
@@ -11,7 +9,7 @@ use decoupler_files::{
     },
     live::{SourcePlan, Tally},
 };
-use eframe::egui::{Align, Label, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo};
+use eframe::egui::{Align, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo};
 
 use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
@@ -21,7 +19,7 @@ use crate::window::{
     theme::{Theme, semibold, space, type_size},
     widgets::{
         card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
-        section_heading_ui, slider_ui,
+        section_heading_ui, segmented_ui, slider_ui,
     },
 };
 
@@ -71,6 +69,8 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
 
 /// Height of the replay bar, in points.
 const REPLAY_BAR_HEIGHT: f32 = space(12);
+/// Speeds of a replay.
+const SPEEDS: [(f64, &str); 4] = [(0.1, "0.1×"), (0.5, "0.5×"), (1.0, "1×"), (4.0, "4×")];
 
 /// Shows the position in the recording and the speed.
 fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -81,41 +81,23 @@ fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mu
     ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
         command_ui(ui, &Command::PlayReplay, view, shared, effects);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let text = RichText::new(format!("{:.1}×", view.source.speed)).size(type_size().note);
-            ui.add_sized([space(8), space(6)], Label::new(text));
-            if bar_slider_ui(ui, "Replay speed", (&mut view.source.speed, 1.0), 0.1..=10.0, space(24)) {
+            if let Some(speed) = segmented_ui(ui, "Replay speed", &SPEEDS, view.source.speed, false) {
+                view.source.speed = speed;
                 view.steer();
             }
-            dim_ui(ui, "Speed");
             ui.add_space(space(2));
             let text = format!("{:.2} of {:.2} s", replay.at_s, replay.length_s);
             ui.label(RichText::new(text).size(type_size().note));
             let mut at_s = replay.at_s;
-            let (length_s, width) = (replay.length_s.max(f64::MIN_POSITIVE), ui.available_width() - space(2));
-            if bar_slider_ui(ui, "Replay position", (&mut at_s, 0.0), 0.0..=length_s, width) {
+            let range = 0.0..=replay.length_s.max(f64::MIN_POSITIVE);
+            let width = ui.available_width() - space(2);
+            let slider = slider_ui(ui, Slider::new(&mut at_s, range), width);
+            slider.widget_info(|| WidgetInfo::slider(ui.is_enabled(), replay.at_s, "Replay position"));
+            if at_s != replay.at_s {
                 view.control(move |control, now| control.seek(at_s, now));
             }
         });
     });
-}
-
-/// Shows a slider that a double click resets to `usual`; returns true if its value has changed.
-fn bar_slider_ui(
-    ui: &mut Ui,
-    name: &str,
-    (value, usual): (&mut f64, f64),
-    range: RangeInclusive<f64>,
-    width: f32,
-) -> bool {
-    let before = *value;
-    let is_logarithmic = *range.start() > 0.0;
-    let slider = slider_ui(ui, Slider::new(value, range).logarithmic(is_logarithmic), width);
-    if slider.double_clicked() {
-        *value = usual;
-    }
-    slider.widget_info(|| WidgetInfo::slider(ui.is_enabled(), before, name));
-    slider.on_hover_text("A double click resets it.");
-    *value != before
 }
 
 /// Shows the decoded surface, the actual one next to it if it is known, and their colour scale.
@@ -167,65 +149,49 @@ pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look)
     .with_common_scales()
 }
 
-/// Shows the text of an empty view, and the button that starts decoding.
+/// Shows what an empty view waits for, and the buttons that fill it.
 fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let (heading, text, button) = invitation(view, shared);
     ui.vertical_centered(|ui| {
-        ui.add_space((0.5 * ui.available_height() - space(20)).max(0.0));
+        ui.add_space((0.5 * ui.available_height() - space(15)).max(0.0));
         ui.set_max_width(ui.available_width().min(space(105)));
-        ui.label(RichText::new(heading).font(semibold(type_size().title)));
-        ui.add_space(space(1));
-        ui.label(RichText::new(text).color(Theme::of(ui).palette.dim));
+        ui.label(RichText::new(invitation(view, shared)).color(Theme::of(ui).palette.dim));
         ui.add_space(space(4));
-        if button.is_some_and(|button| ui.add(primary_button(button)).clicked()) {
-            match button {
-                Some(TRAIN) => effects.extend([Effect::ShowTraining, Effect::Train]),
-                _ => view.start(shared, effects),
-            }
+        let can_train = view.network(shared).is_none() && !shared.phase.is_busy();
+        if can_train && ui.add(primary_button("Train a network now")).clicked() {
+            effects.extend([Effect::ShowTraining, Effect::Train]);
         }
         ui.add_space(space(2));
         let hint = "Four seconds of a ball that wanders over a simulated array, with a network that decodes them.";
-        let sample = ui.add(ghost_button("Play the sample recording"));
+        let sample = ui.add_enabled(view.running.is_none(), ghost_button("Play the sample recording"));
         if sample.on_hover_text(hint).clicked() {
             view.play_sample(shared);
         }
     });
 }
 
-/// Buttons and heading of an empty view.
-const TRAIN: &str = "Train a network now";
-const START: &str = "Start this source";
-const HEADING: &str = "Decode live readings";
-
-/// Returns the heading and the text of an empty view, and its button.
-fn invitation(view: &LiveView, shared: &Shared) -> (&'static str, String, Option<&'static str>) {
+/// Returns what an empty view waits for.
+fn invitation(view: &LiveView, shared: &Shared) -> String {
     if let Some(running) = &view.running {
-        let text = match &view.shown.counts.last_bad {
+        return match &view.shown.counts.last_bad {
             Some(reason) => format!("Malformed lines: {}. Last: {reason}.", view.shown.counts.bad),
-            None => format!("It appears here as soon as it arrives from {}.", running.source_text()),
+            None => format!("Waiting for the first frame from {}.", running.source_text()),
         };
-        return ("Waiting for the first frame", text, None);
     }
     let Some((name, file)) = view.network(shared) else {
-        let is_busy = shared.phase.is_busy();
-        let mut text =
-            "Train one with the settings of the Train view, which takes seconds to minutes, or open a network file.";
-        if is_busy {
-            text = "One is being trained in the Train view: it can be used here as soon as it is finished.";
-        }
-        let text = format!("Live decoding needs a trained network. {text}");
-        return ("No network yet", text, (!is_busy).then_some(TRAIN));
+        return match shared.phase.is_busy() {
+            true => "A network is being trained: it can be used here as soon as it is finished.".to_owned(),
+            false => "Live decoding needs a trained network. Training one takes seconds to minutes.".to_owned(),
+        };
     };
-    let text = match view.plan(shared).map(|(_, plan)| plan.source) {
-        Err(obstacle) => return (HEADING, obstacle, None),
+    match view.plan(shared).map(|plan| plan.source) {
+        Err(obstacle) => obstacle,
         Ok(SourcePlan::Simulated(_)) => format!(
-            "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any hardware. To \
-             decode your own, choose a replay, a serial port or a TCP address on the left."
+            "Start shows an indenter that wanders over a simulated array, decoded by the network '{name}'. To decode your own \
+             readings, choose a replay, a serial port or a TCP address on the left."
         ),
-        Ok(_) if file.problem.sensor.is_some() => format!("The network '{name}' decodes its frames as they arrive."),
-        Ok(_) => format!("The network '{name}' decodes its samples as they arrive, by the names of their columns."),
-    };
-    (HEADING, text, Some(START))
+        Ok(_) if file.problem.sensor.is_some() => format!("The network '{name}' decodes frames as they arrive."),
+        Ok(_) => format!("The network '{name}' decodes samples as they arrive, by the names of their columns."),
+    }
 }
 
 /// Shows the readings of an array as a map of rows and columns, with the faulty wires marked.
@@ -277,13 +243,8 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
     ui.add_space(space(2));
 }
 
-/// Shows rate, latency and losses of the stream.
+/// Shows latency and losses of the stream.
 fn stream_ui(ui: &mut Ui, counts: &Tally) {
-    let rate = match counts.is_waiting {
-        true => "waiting".to_owned(),
-        false => format!("{:.0} frames per second", counts.frames_per_second),
-    };
-    fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
     let hint = "Time from reading a frame to its answer: median and 99th percentile.";
     let quantile = |share| counts.latencies.quantile(share);
     let [median, high] = [0.5, 0.99].map(|share| quantile(share).map_or_else(|| format_number(None), format_duration));

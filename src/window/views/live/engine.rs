@@ -26,7 +26,8 @@ use decoupler_files::{
         targets_over_time_figure,
     },
     live::{
-        History, Input, LiveArray, Note, Recorded, ReplayState, Session, SessionEvent, SessionPlan, Tally, Watched,
+        History, Input, Keeping, LiveArray, Note, Recorded, ReplayState, Session, SessionError, SessionEvent,
+        SessionPlan, Tally, Watched,
     },
 };
 use glam::DVec3;
@@ -55,15 +56,15 @@ pub enum LiveEvent {
     Ended(Result<(), String>),
 }
 
-/// Minimum time between displayed frames.
-const BETWEEN_SHOWN: Duration = Duration::from_micros(16_600);
 /// Maximum wait for a line of a device between checks for commands.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
+/// Time between attempts to connect to a lost device or socket again.
+const BETWEEN_TRIES: Duration = Duration::from_secs(1);
 /// Maximum wait for a command while the source is paused.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
 /// Runs `plan` until its source ends, the sender of the commands is gone, or the work is cancelled; `shown` is what was
-/// displayed before.
+/// displayed before. A device or socket that was lost is opened again until it answers.
 ///
 /// # Errors
 /// If decoding cannot begin or continue, with the reason.
@@ -75,7 +76,8 @@ pub fn run(
 ) -> Result<(), String> {
     plan.source = plan.source.resolved();
     let mut screen = Screen::new(&plan, shown);
-    let mut session = match Session::open(plan, &Job::new(&|| report.is_cancelled())) {
+    let open = || Session::open(plan.clone(), &Job::new(&|| report.is_cancelled()));
+    let mut session = match open() {
         Err(_) if report.is_cancelled() => return Ok(()),
         opened => opened.map_err(|error| error.to_string())?,
     };
@@ -83,31 +85,36 @@ pub fn run(
         let shown = screen.show(session);
         report.progress(LiveEvent::Shown(Box::new(shown)), |_, _| {});
     };
-    let (mut is_drawn, mut has_news, mut may_show_at) = (true, false, Instant::now());
+    let (mut is_drawn, mut has_news, mut retry_at) = (true, false, None);
     let end = loop {
         if report.is_cancelled() {
             break Ok(());
         }
-        let now = Instant::now();
-        if has_news && is_drawn && may_show_at <= now {
-            show(&mut screen, &session);
-            (has_news, is_drawn, may_show_at) = (false, false, now + BETWEEN_SHOWN);
-        }
-        let mut until = session.input.due(now).unwrap_or(now + LONGEST_WAIT);
         if has_news && is_drawn {
-            until = until.min(may_show_at);
+            show(&mut screen, &session);
+            (has_news, is_drawn) = (false, false);
         }
-        match commands.recv_timeout(until.saturating_duration_since(now)) {
+        let now = Instant::now();
+        let due = retry_at.or_else(|| session.input.due(now));
+        let wait = due.map_or(LONGEST_WAIT, |due| due.saturating_duration_since(now));
+        match commands.recv_timeout(wait) {
             Ok(Request::Drawn) => is_drawn = true,
             Ok(Request::Change(change)) => {
                 screen.follow_recording(&session);
                 has_news = true;
                 change(&mut session).unwrap_or_else(|reason| report.send(LiveEvent::Failed(reason)));
             }
+            Err(RecvTimeoutError::Timeout) if retry_at.take().is_some() => {
+                let mut again = open().map_err(|error| error.to_string())?.input;
+                if let (Input::Lines(again), Input::Lines(before)) = (&mut again, &session.input) {
+                    again.begun = before.begun;
+                }
+                session.input = again;
+            }
             Err(RecvTimeoutError::Timeout) => match session.next(Instant::now(), BETWEEN_LOOKS) {
                 SessionEvent::Answer => {
                     session.count();
-                    (has_news, screen.has_answer) = (true, true);
+                    (has_news, screen.has_answer, screen.shown.lost) = (true, true, None);
                 }
                 SessionEvent::Bad(_) => {
                     has_news = true;
@@ -118,7 +125,13 @@ pub fn run(
                     let is_stream = matches!(session.input, Input::Lines(_));
                     has_news |= is_stream && session.tally.falls_silent(Instant::now());
                 }
-                SessionEvent::End(end) => break end.map_err(|error| error.to_string()),
+                SessionEvent::End(end) => {
+                    let Some(reason) = lost(&session, &end) else {
+                        break end.map_err(|error| error.to_string());
+                    };
+                    (has_news, screen.shown.lost) = (true, Some(reason));
+                    retry_at = Some(Instant::now() + BETWEEN_TRIES);
+                }
             },
             Err(RecvTimeoutError::Disconnected) => break Ok(()),
         }
@@ -135,6 +148,20 @@ pub fn run(
     end
 }
 
+/// Returns the reason why a device or socket that has sent frames was lost; `None` for another end.
+fn lost(session: &Session, end: &Result<(), SessionError>) -> Option<String> {
+    let Input::Lines(lines) = &session.input else {
+        return None;
+    };
+    let has_sent = session.tally.decoded > 0 && lines.source.keeping() == Keeping::Latest;
+    match end {
+        Ok(()) => Some(format!("{} has ended", lines.source)),
+        Err(error @ (SessionError::Source(_) | SessionError::Lost(..))) => Some(error.to_string()),
+        Err(_) => None,
+    }
+    .filter(|_| has_sent)
+}
+
 /// State of a session, ready to be drawn.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
@@ -146,6 +173,8 @@ pub struct Snapshot {
     pub recorded: Option<Recorded>,
     /// True while it is under way.
     pub is_recording: bool,
+    /// Reason why the source was lost, until it sends again.
+    pub lost: Option<String>,
     /// Position in the replayed recording.
     pub replay: Option<ReplayState>,
     /// Gains of the unloaded state by which readings are divided.
@@ -214,8 +243,6 @@ pub struct Screen {
     noise: f64,
     nodes: Arc<[String]>,
     surfaces: Surfaces,
-    /// Recent peak of the drops of the readings.
-    peak_percent: f64,
 }
 
 /// Returns the surfaces of the last answer.
@@ -271,7 +298,6 @@ impl Screen {
             noise: plan.noise.relative,
             nodes,
             surfaces,
-            peak_percent: 0.0,
         }
     }
 
@@ -298,7 +324,7 @@ impl Screen {
         }
     }
 
-    fn answered(&mut self, session: &Session) -> Answered {
+    fn answered(&self, session: &Session) -> Answered {
         let (last, problem) = (&session.last, &self.network.problem);
         let mut answered = Answered {
             network: Arc::clone(&self.network),
@@ -342,17 +368,16 @@ impl Screen {
         answered
     }
 
-    /// Returns the map of the readings. Its scale follows the largest drop in round steps and falls slowly, which keeps colours
-    /// comparable from frame to frame; faulty wires do not count.
-    fn readings(&mut self, array: &LiveArray, frame_ohm: &[f64]) -> HeatMap {
-        /// Decay of the peak per frame.
-        const DECAY: f64 = 0.995;
-        let drops_percent = array.drops_percent(frame_ohm);
-        let drops = drops_percent.indexed_iter();
-        let drops = drops.filter(|((row, column), _)| !array.watched.leaves_out(array.rows[*row], *column));
-        let drops = drops.map(|(_, &drop)| drop).filter(|drop| drop.is_finite());
-        self.peak_percent = drops.fold(DECAY * self.peak_percent, f64::max);
-        readings_figure(drops_percent, &array.rows, round_up(self.peak_percent.max(0.5)))
+    /// Returns the map of the readings. Its colours span the drops of the training, so that they mean the same in every frame.
+    fn readings(&self, array: &LiveArray, frame_ohm: &[f64]) -> HeatMap {
+        let lowest_ohm = (0..array.rows.len()).flat_map(|row| {
+            let inputs = self.network.network.at(row).inputs();
+            let lowest_ohm = |column| inputs.range().map_or(0.0, |range| range.extremes(column).0);
+            (0..inputs.channels()).map(lowest_ohm)
+        });
+        let drops_percent = array.drops_percent(&Vec::from_iter(lowest_ohm));
+        let largest_percent = drops_percent.into_iter().fold(0.5, f64::max);
+        readings_figure(array.drops_percent(frame_ohm), &array.rows, largest_percent)
     }
 
     fn residual(&self, residual: f64) -> Fact {
@@ -429,32 +454,4 @@ fn fault(watched: &Watched) -> (Fact, Option<String>) {
     );
     let fact = Fact::new("Fault", hint, value, consequence.is_some());
     (fact, consequence.map(|text| capitalised(&text)))
-}
-
-/// Returns the next 1, 2 or 5 times a power of ten.
-fn round_up(value: f64) -> f64 {
-    let decade = 10_f64.powf(value.log10().floor());
-    let steps = [1.0, 2.0, 5.0].map(|step| step * decade);
-    let step = steps.into_iter().find(|step| *step >= value * (1.0 - 1e-9));
-    step.unwrap_or(10.0 * decade)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_scale_ends_at_round_numbers() {
-        for (peak, expected) in [
-            (0.5, 0.5),
-            (0.6, 1.0),
-            (1.0, 1.0),
-            (1.3, 2.0),
-            (4.9, 5.0),
-            (73.0, 100.0),
-        ] {
-            let found = round_up(peak);
-            assert!((found / expected - 1.0).abs() < 1e-9, "{peak}: {found}");
-        }
-    }
 }

@@ -1,13 +1,16 @@
 //! The form on the left: the network that decodes, and the source of what it decodes.
 
-use std::sync::{Arc, mpsc::channel};
+use std::{
+    path::Path,
+    sync::{Arc, mpsc::channel},
+};
 
 use decoupler_core::{dataset::Simulation, scene::Rows};
 use decoupler_files::{
     export::{NetworkFile, format_percent},
-    live::{Motion, Source, SourceError, SourcePlan},
+    live::{Source, SourceError, SourcePlan},
 };
-use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
+use eframe::egui::{ComboBox, PopupCloseBehavior, TextEdit, Ui, WidgetInfo, accesskit::Role, vec2};
 
 use super::LiveView;
 use crate::window::{
@@ -15,8 +18,8 @@ use crate::window::{
     theme::space,
     widgets::{
         dim_ui,
-        fields::{count_ui, quantity_ui},
-        ghost_button, note_ui, scrolled_ui, section_heading_ui, segmented_ui,
+        fields::{count_ui, percent_ui, quantity_ui},
+        ghost_button, scrolled_ui, section_heading_ui, segmented_ui,
     },
 };
 
@@ -25,8 +28,6 @@ use crate::window::{
 pub struct SourceForm {
     /// Kind of source.
     pub kind: SourceKind,
-    /// Motion of the simulated indenter.
-    pub motion: Motion,
     /// File to be replayed, as typed.
     pub path: String,
     /// Recorded seconds per second.
@@ -56,7 +57,6 @@ impl Default for SourceForm {
     fn default() -> Self {
         Self {
             kind: SourceKind::Simulated,
-            motion: Motion::Wandering,
             path: String::new(),
             speed: 1.0,
             frames_per_second: 50.0,
@@ -79,19 +79,23 @@ impl SourceForm {
         self.noise.unwrap_or(of_scene)
     }
 
+    /// Returns the kind of source: a network of a recording has no sensor model to simulate.
+    fn kind(&self, has_sensor: bool) -> SourceKind {
+        match self.kind {
+            SourceKind::Simulated if !has_sensor => SourceKind::Replay,
+            kind => kind,
+        }
+    }
+
     /// Returns the source. This is called in every frame and does not access the file system.
     ///
     /// # Errors
-    /// If a field is empty or invalid, or there is no sensor to simulate, with what to do.
+    /// If a field is empty or invalid, with what to do.
     pub fn plan(&self, has_sensor: bool) -> Result<SourcePlan, String> {
-        Ok(match self.kind {
-            SourceKind::Simulated if has_sensor => SourcePlan::Simulated(self.frames_per_second),
-            SourceKind::Simulated => {
-                let reason = "A network of a recording has no sensor model to simulate: choose another source.";
-                return Err(reason.to_owned());
-            }
+        Ok(match self.kind(has_sensor) {
+            SourceKind::Simulated => SourcePlan::Simulated(self.frames_per_second),
             SourceKind::Replay if self.path.trim().is_empty() => {
-                return Err("Choose a file of frames, or record one.".to_owned());
+                return Err("Choose the file to replay.".to_owned());
             }
             SourceKind::Replay => SourcePlan::Replay(self.path.trim().into()),
             SourceKind::Serial => {
@@ -105,18 +109,25 @@ impl SourceForm {
         })
     }
 
-    /// Shows the fields of the chosen kind.
-    fn fields_ui(&mut self, ui: &mut Ui) {
+    /// Shows the fields of a kind.
+    fn fields_ui(&mut self, ui: &mut Ui, kind: SourceKind) {
         let lines = "Lines of CSV. Of an array: the number of the row-wire and its resistances in ohm, or a whole snapshot in \
                      one line, row by row. Of another sensor: the inputs of the network in their order, or under their names \
                      in a header.";
-        match self.kind {
+        match kind {
             SourceKind::Simulated => {
                 let hint = "Rate at which the simulated array is read.";
                 let rate = &mut self.frames_per_second;
                 quantity_ui(ui, "Frames per second", hint, rate, 0.1..=10_000.0, "Hz");
             }
-            SourceKind::Replay => text_ui(ui, "Frames", FRAMES.description, &mut self.path),
+            SourceKind::Replay => {
+                text_ui(ui, "File", FRAMES.description, &mut self.path);
+                // The field shows only the beginning of a long path.
+                let path = Path::new(self.path.trim());
+                if let (Some(name), true) = (path.file_name(), path.is_absolute()) {
+                    dim_ui(ui, &name.display().to_string());
+                }
+            }
             SourceKind::Serial => {
                 let hint = "Name of the port: /dev/ttyUSB0, /dev/ttyACM0, COM3.";
                 text_ui(ui, "Port", hint, &mut self.port);
@@ -141,11 +152,11 @@ fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
     ui.add(edit).labelled_by(label.id).on_hover_text(hint);
 }
 
-/// Shows the network and the source. Only the motion of the indenter can be changed while a source is running.
+/// Shows the network and the source, which cannot be changed while it is running.
 pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "live form", |ui| {
         section_heading_ui(ui, "Network");
-        network_ui(ui, view, shared, effects);
+        network_ui(ui, view, shared);
         section_heading_ui(ui, "Source");
         let simulation = view.network(shared).map(|(_, file)| file.problem.sensor);
         let has_sensor = view.has_sensor(shared);
@@ -157,39 +168,30 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
                 (SourceKind::Tcp, "TCP"),
             ];
             let kinds = if has_sensor { &kinds[..] } else { &kinds[1..] };
-            let kind = view.source.kind;
-            view.source.kind = segmented_ui(ui, "Source", kinds, kind, false).unwrap_or(kind);
+            let kind = view.source.kind(has_sensor);
+            let picked = segmented_ui(ui, "Source", kinds, kind, false);
+            view.source.kind = picked.unwrap_or(view.source.kind);
             ui.add_space(space(1));
-            view.source.fields_ui(ui);
-            if view.source.kind == SourceKind::Replay {
-                open_ui(ui, view, "Choose file…", FRAMES, effects);
+            view.source.fields_ui(ui, kind);
+            if kind == SourceKind::Replay {
+                if ui.add(ghost_button("Choose file…")).on_hover_text(FRAMES.description).clicked() {
+                    let (send, chosen) = channel();
+                    view.chosen = Some(chosen);
+                    effects.push(Effect::ChooseFile(FileTask::choose(FRAMES, "frames.csv", send)));
+                }
                 dim_ui(ui, "Frames and samples without times are replayed at 50 per second.");
             }
             if let Some(Some(simulation)) = &simulation {
                 let hint = "Noise of a reading, simulated or of your device, relative to the reading (standard deviation). Fault \
                             and contact detection use it: too small a value causes false alarms.";
-                let mut noise = view.source.noise(simulation);
-                if quantity_ui(ui, "Relative noise", hint, &mut noise, 0.0..=1.0, "").changed() {
+                let before = view.source.noise(simulation);
+                let mut noise = before;
+                percent_ui(ui, "Relative noise", hint, &mut noise, before, 0.0..=100.0);
+                if noise != before {
                     view.source.noise = Some(noise);
                 }
             }
         });
-        if view.source.kind == SourceKind::Simulated && has_sensor {
-            let motions = [
-                (Motion::Wandering, "Wander"),
-                (Motion::Held, "Hold"),
-                (Motion::Lifted, "Lift"),
-            ];
-            ui.label("Indenter");
-            if let Some(motion) = segmented_ui(ui, "Indenter", &motions, view.source.motion, true) {
-                view.source.motion = motion;
-                view.steer();
-            }
-        }
-        if let (Err(obstacle), Some(_)) = (view.plan(shared), simulation) {
-            ui.add_space(space(1));
-            note_ui(ui, &obstacle);
-        }
         ui.add_space(space(4));
     });
 }
@@ -206,7 +208,7 @@ pub struct Picked {
 }
 
 /// Shows the list of networks, and what the chosen one is.
-fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared) {
     let runs = shared.runs.workspace.runs.iter().rev();
     let newest = runs.clone().next();
     let newest = newest.map_or_else(|| "no run yet".to_owned(), |run| format!("Newest run: {}", run.name));
@@ -219,14 +221,23 @@ fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut V
     let width = ui.available_width();
     let label = ui.label("Decode with");
     let combo = ComboBox::from_id_salt("live network").selected_text(shown).width(width);
-    let combo = combo.truncate().show_ui(ui, |ui| {
-        ui.selectable_value(&mut pick, None, newest);
-        for run in runs {
-            ui.selectable_value(&mut pick, Some(Some(run.id)), &run.name);
+    let combo = combo.close_behavior(PopupCloseBehavior::CloseOnClickOutside).truncate();
+    let combo = combo.show_ui(ui, |ui| {
+        let field = TextEdit::singleline(&mut view.search).hint_text("Search runs");
+        let field = ui.add(field.desired_width(f32::INFINITY));
+        field.widget_info(|| WidgetInfo::labeled(Role::SearchInput, true, "Search runs"));
+        let words = view.search.to_lowercase();
+        let mut picked = ui.selectable_value(&mut pick, None, newest).clicked();
+        for run in runs.filter(|run| run.name.to_lowercase().contains(&words)) {
+            picked |= ui.selectable_value(&mut pick, Some(Some(run.id)), &run.name).clicked();
+        }
+        if picked {
+            view.search.clear();
+            ui.close();
         }
     });
-    let hint = "The network that decodes the frames: a finished run, or a network file. A replay is decoded again as soon as \
-                another one is chosen.";
+    let hint = "The network that decodes the frames: a finished run, or a network file that was opened. A replay is decoded \
+                again as soon as another one is chosen.";
     combo.response.labelled_by(label.id).on_hover_text(hint);
     if let Some((_, file)) = view.network(shared) {
         let row = match file.problem.sensor.map(|simulation| simulation.scene.rows) {
@@ -239,19 +250,10 @@ fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut V
         let error = format_percent(file.scores.network.percent());
         dim_ui(ui, &format!("{name} on its test set {error}"));
     }
-    ui.add_space(space(1));
-    open_ui(ui, view, "Open network file…", NETWORK, effects);
     if pick != before {
         view.pick(pick.flatten(), shared);
     }
 }
-
-/// A network to decode with.
-pub const NETWORK: FileWords = FileWords {
-    kind: "network",
-    description: "A network saved by the Train view or by train --out in a terminal.",
-    extensions: &["json"],
-};
 
 /// Frames to replay.
 const FRAMES: FileWords = FileWords {
@@ -260,13 +262,3 @@ const FRAMES: FileWords = FileWords {
                   of a recording a file with its inputs under their names.",
     extensions: &["csv"],
 };
-
-/// Shows the button that opens a file.
-fn open_ui(ui: &mut Ui, view: &mut LiveView, text: &str, words: FileWords, effects: &mut Vec<Effect>) {
-    if ui.add(ghost_button(text)).on_hover_text(words.description).clicked() {
-        let (send, chosen) = channel();
-        view.chosen = Some((words, chosen));
-        let suggestion = format!("{}.{}", words.kind, words.extensions[0]);
-        effects.push(Effect::ChooseFile(FileTask::choose(words, &suggestion, send)));
-    }
-}

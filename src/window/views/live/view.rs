@@ -19,7 +19,7 @@ use eframe::egui::{Ui, Widget};
 use super::{
     cards::{self, surface_figure},
     engine::{Answered, LiveEvent, Request, Snapshot, run},
-    form::{NETWORK, Picked, SourceForm, SourceKind, form_ui},
+    form::{Picked, SourceForm, SourceKind, form_ui},
 };
 use crate::window::{
     glossary,
@@ -41,13 +41,13 @@ pub struct LiveView {
     pub running: Option<Running>,
     /// The network that decodes; `None` for the newest run.
     pub(super) picked: Option<Picked>,
+    /// Text by which runs are searched.
+    pub(super) search: String,
     pub(super) source: SourceForm,
     /// The node under the pointer, marked on all surfaces.
     pub(super) node: Option<usize>,
     /// Path of the file that the user is asked for.
-    pub(super) chosen: Option<(FileWords, Receiver<PathBuf>)>,
-    /// The stream that has ended by itself.
-    ended: Option<SourcePlan>,
+    pub(super) chosen: Option<Receiver<PathBuf>>,
     /// True if the window has received a snapshot and not yet reported to the thread that it was drawn.
     is_to_be_drawn: bool,
     /// Reads a network, and the path of the recording that it shall decode.
@@ -83,10 +83,10 @@ impl LiveView {
             shown: Snapshot::default(),
             running: None,
             picked: None,
+            search: String::new(),
             source: SourceForm::default(),
             node: None,
             chosen: None,
-            ended: None,
             is_to_be_drawn: false,
             loading: Background::prompt("network file", Arc::clone(&wake)),
             job: Background::prompt("live", wake),
@@ -113,26 +113,25 @@ impl LiveView {
         });
     }
 
-    /// Returns the name of the chosen network, and the plan for the current settings.
+    /// Returns the plan for the current settings.
     ///
     /// # Errors
     /// If there is no network or a setting is missing, with what to do.
-    pub(super) fn plan(&self, shared: &Shared) -> Result<(String, SessionPlan), String> {
+    pub(super) fn plan(&self, shared: &Shared) -> Result<SessionPlan, String> {
         let network = self.network(shared);
-        let (name, network) = network.ok_or("Train a network, or open a network file.")?;
+        let (_, network) = network.ok_or("Train a network, or open a network file.")?;
         let simulation = network.problem.sensor.as_ref();
         let noise = simulation.map(|simulation| Noise {
             relative: self.source.noise(simulation),
             ..simulation.scene.noise.in_test()
         });
-        let plan = SessionPlan {
+        Ok(SessionPlan {
             network: Arc::clone(network),
             source: self.source.plan(simulation.is_some())?,
             noise: noise.unwrap_or_default(),
             zero: self.shown.zero.clone(),
             unit: Unit::Frames,
-        };
-        Ok((name.to_owned(), plan))
+        })
     }
 
     /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
@@ -159,18 +158,26 @@ impl LiveView {
         }
     }
 
-    fn begin(&mut self, shared: &Shared, replay: Option<ReplayState>) {
-        let Ok((network, plan)) = self.plan(shared) else { return };
+    /// Removes the answers from the screen.
+    fn clear(&mut self) {
         let before = std::mem::take(&mut self.shown);
         self.shown = Snapshot {
-            // A replay continues without a gap on the screen.
-            answer: before.answer.filter(|_| replay.is_some()),
             recorded: before.recorded,
             zero: before.zero,
-            replay,
             ..Snapshot::default()
         };
-        (self.node, self.ended, self.is_to_be_drawn) = (None, None, false);
+    }
+
+    fn begin(&mut self, shared: &Shared, replay: Option<ReplayState>) {
+        let (Some((name, _)), Ok(plan)) = (self.network(shared), self.plan(shared)) else {
+            return;
+        };
+        let network = name.to_owned();
+        // A replay continues without a gap on the screen.
+        let answer = self.shown.answer.take().filter(|_| replay.is_some());
+        self.clear();
+        (self.shown.answer, self.shown.replay) = (answer, replay);
+        (self.node, self.is_to_be_drawn) = (None, false);
         let (requests, incoming) = channel();
         self.running = Some(Running {
             network,
@@ -213,17 +220,10 @@ impl LiveView {
         });
     }
 
-    /// Applies the motion of the indenter and the speed of the replay to the source.
+    /// Applies the speed to the replay.
     pub(super) fn steer(&self) {
-        let (motion, speed) = (self.source.motion, self.source.speed);
-        self.change(move |session| {
-            match &mut session.input {
-                Input::Simulated(simulated, _) => simulated.motion = motion,
-                Input::Replay(replay) => replay.set_speed(speed, Instant::now()),
-                Input::Lines(_) => {}
-            }
-            Ok(())
-        });
+        let speed = self.source.speed;
+        self.control(move |control, now| control.set_speed(speed, now));
     }
 
     /// Takes the latest frames as the unloaded state.
@@ -261,12 +261,6 @@ impl LiveView {
         self.start(shared, effects);
     }
 
-    /// Returns true if a stream has ended by itself and is still the chosen source.
-    pub fn can_retry(&self, shared: &Shared) -> bool {
-        let is_same = |ended: &SourcePlan| self.plan(shared).is_ok_and(|(_, plan)| plan.source == *ended);
-        self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
-    }
-
     /// Reads a network in the background.
     pub(super) fn load(&mut self, read: impl FnOnce() -> Result<(Picked, Option<PathBuf>), String> + Send + 'static) {
         self.loading.start(
@@ -281,43 +275,34 @@ impl LiveView {
         self.load(move || write_sample(&folder));
     }
 
-    /// Takes the file that the user has chosen.
-    fn take_chosen(&mut self) {
-        let Some((words, Ok(path))) = self.chosen.as_ref().map(|(words, paths)| (*words, paths.try_recv())) else {
-            return;
-        };
-        self.chosen = None;
-        if words != NETWORK {
-            self.source.path = path.display().to_string();
-            return;
-        }
-        self.load(move || {
-            let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
-            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-            let (run, name, file) = (None, name.into_owned(), Arc::new(file));
-            Ok((Picked { run, name, file }, None))
-        });
-    }
-
     /// Returns the state of the stream, its network and source, and its rate.
-    fn status(&self) -> Status {
+    fn status(&self, shared: &Shared) -> Status {
         let (counts, replay) = (&self.shown.counts, &self.shown.replay);
         let Some(running) = &self.running else {
-            return match counts.decoded {
-                0 => Status::new(Tone::Calm, "Ready: press Start"),
-                decoded => Status::new(Tone::Calm, format!("Stopped after {}", counted(decoded, "frame"))),
+            let text = match (self.plan(shared), counts.decoded) {
+                (Err(obstacle), _) => obstacle,
+                (Ok(_), 0) => "Ready: press Start".to_owned(),
+                (Ok(_), decoded) => format!("Stopped after {}", counted(decoded, "frame")),
             };
+            return Status::new(Tone::Calm, text);
         };
         let fault = self.shown.answer.as_ref().map(|answer| &answer.fault);
         let mut status = match (fault, replay) {
+            _ if self.shown.lost.is_some() => Status::new(Tone::Warning, "Connection lost: trying again"),
             (None, _) => Status::new(Tone::Busy, "Waiting for the first frame"),
             _ if counts.is_waiting => Status::new(Tone::Warning, "No frame for two seconds"),
             (Some(Some((fault, _))), _) => Status::new(Tone::Warning, format!("Fault: {fault}")),
+            (_, Some(replay)) if !replay.is_playing && replay.at_s >= replay.length_s => {
+                Status::new(Tone::Calm, "Replay ended: press Play to see it again")
+            }
             (_, Some(replay)) if !replay.is_playing => Status::new(Tone::Calm, "Replay paused"),
             (_, Some(_)) => Status::new(Tone::Good, "Replaying"),
             (_, None) => Status::new(Tone::Good, "Live"),
         };
         status = status.with_note(format!("{}, {}", running.network, running.source_text()));
+        if let Some(reason) = &self.shown.lost {
+            status = status.with_note(reason);
+        }
         if counts.decoded > 0 {
             status = status.with_note(format!("{:.0} frames per second", counts.frames_per_second));
         }
@@ -337,9 +322,9 @@ impl View for LiveView {
                 LiveEvent::Shown(shown) => (self.shown, self.is_to_be_drawn) = (*shown, true),
                 LiveEvent::Failed(reason) => effects.push(notify(Notice::Failed(reason))),
                 LiveEvent::Ended(end) => {
-                    let Some(running) = self.running.take() else { continue };
-                    let is_stream = self.shown.replay.is_none() && !matches!(running.source, SourcePlan::Simulated(_));
-                    self.ended = is_stream.then_some(running.source);
+                    if self.running.take().is_none() {
+                        continue;
+                    }
                     effects.push(notify(match end {
                         Err(reason) => Notice::Failed(reason),
                         Ok(()) => Notice::Done("The source has ended.".to_owned()),
@@ -347,7 +332,10 @@ impl View for LiveView {
                 }
             }
         }
-        self.take_chosen();
+        if let Some(Ok(path)) = self.chosen.as_ref().map(Receiver::try_recv) {
+            self.source.path = path.display().to_string();
+            self.chosen = None;
+        }
         match self.loading.next_event() {
             Some(Ok((picked, recording))) => {
                 self.picked = Some(picked);
@@ -358,6 +346,13 @@ impl View for LiveView {
             }
             Some(Err(reason)) => effects.push(notify(Notice::Failed(reason))),
             None => {}
+        }
+        let network = self.network(shared).map(|(_, file)| file);
+        let decoded_by = self.shown.answer.as_ref().map(|answer| &answer.network);
+        if let (None, Some(network), Some(decoded_by)) = (&self.running, network, decoded_by)
+            && !Arc::ptr_eq(network, decoded_by)
+        {
+            self.clear();
         }
     }
 
@@ -391,29 +386,24 @@ impl View for LiveView {
     }
 
     fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
-        let answer = self.shown.answer.as_deref();
-        let answer = answer.ok_or_else(|| "There is no frame yet: start a source.".to_owned());
-        let surface = answer.clone();
-        let surface = surface.map(|answer| || surface_figure(answer, None, shared.look).into());
-        let surface = Shown::figure("Surface", "live-surface".to_owned(), surface);
-        if let Ok(answer) = &answer
-            && let Some(chart) = &answer.chart
-        {
-            let (chart, values) = (Ok(|| chart.clone().into()), Ok(|| values_table(answer)));
-            let chart = Shown::figure("Decoded values", "live-values".to_owned(), chart);
-            let values = Shown::table("Decoded values", "live-values".to_owned(), values);
-            let surface = (!answer.surfaces.is_empty()).then_some(surface);
-            return [chart].into_iter().chain(surface).chain([values]).collect();
-        }
-        let readings = answer.and_then(|answer| answer.readings.as_ref().ok_or_else(String::new));
-        let readings = readings.map(|readings| || readings.clone().coloured(shared.look.colours).into());
         let recorded = self.shown.recorded.as_ref().map(save_recording);
         let recorded = recorded.ok_or_else(|| "Nothing is recorded: press Record while a source runs.".to_owned());
-        vec![
-            surface,
-            Shown::figure("Readings", "live-readings".to_owned(), readings),
-            Shown::file("Recording", recorded),
-        ]
+        let mut shown = Vec::from_iter(self.has_sensor(shared).then(|| Shown::file("Recording", recorded)));
+        let Some(answer) = &self.shown.answer else { return shown };
+        if !answer.surfaces.is_empty() {
+            let surface = Ok(|| surface_figure(answer, None, shared.look).into());
+            shown.push(Shown::figure("Surface", "live-surface".to_owned(), surface));
+        }
+        if let Some(readings) = &answer.readings {
+            let readings = Ok(|| readings.clone().coloured(shared.look.colours).into());
+            shown.push(Shown::figure("Readings", "live-readings".to_owned(), readings));
+        }
+        if let Some(chart) = &answer.chart {
+            let (name, stem) = ("Decoded values", "live-values".to_owned());
+            shown.push(Shown::figure(name, stem.clone(), Ok(|| chart.clone().into())));
+            shown.push(Shown::table(name, stem, Ok(|| values_table(answer))));
+        }
+        shown
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -426,7 +416,7 @@ impl View for LiveView {
         if std::mem::take(&mut self.is_to_be_drawn) {
             self.ask(Request::Drawn);
         }
-        Some(self.status())
+        Some(self.status(shared))
     }
 }
 
