@@ -72,10 +72,9 @@ pub(super) struct Decode {
 
 impl Decode {
     pub(super) fn run(self) -> Result<(), Failure> {
-        let standard_input = PathBuf::from("-");
         let (Some(data), Some(out), false) = (&self.data, &self.out, self.follow.follow) else {
             let file = NetworkFile::load(&self.network)?;
-            return self.follow.run(self.data.as_ref().unwrap_or(&standard_input), file);
+            return self.follow.run(self.data.as_deref().unwrap_or(Path::new("-")), file);
         };
         let data = input(&data.to_string_lossy()).unwrap_or_else(|_| data.clone());
         for (name, path) in [("data", &data), ("network", &self.network)] {
@@ -85,12 +84,13 @@ impl Decode {
             }
         }
         check_output("--out", out)?;
-        decode_file(&NetworkFile::load(&self.network)?, &data, out)
+        let (lines, lines_outside) = decode_file(&NetworkFile::load(&self.network)?, &data, out)?;
+        print(|| json!({"lines": lines, "lines_outside": lines_outside}), |_| Ok(()))
     }
 }
 
-/// Decodes the file `input` into the file `output`.
-fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
+/// Decodes the file `input` into the file `output`; returns the number of lines, and of those outside the training range.
+pub(crate) fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(usize, usize), Failure> {
     let refused = |source| WriteError::io(output, source);
     let mut answers = Answers::new(file, Form::Csv, AtomicFile::create(output)?);
     let mut answer = Answer::default();
@@ -128,10 +128,7 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     let outside = answers.outside;
     outside.warn();
     drift.end();
-    print(
-        || json!({"lines": outside.lines, "lines_outside": outside.outside}),
-        |_| Ok(()),
-    )
+    Ok((outside.lines, outside.outside))
 }
 
 /// Fills `values` with the answers, each followed by the half-width of its interval if the target has one.

@@ -175,10 +175,7 @@ impl Trade {
             [] => vec![0.0, 1e-4, 1e-3, 1e-2],
             given => given.to_vec(),
         };
-        let presets = match self.scene.preset {
-            Some(preset) => vec![preset],
-            None => Preset::ALL.to_vec(),
-        };
+        let presets = self.scene.preset.map_or(Preset::ALL.to_vec(), |preset| vec![preset]);
         let decoders = self.scene.decoders();
         let mut cases = Vec::new();
         for &noise in &noises {
@@ -208,10 +205,9 @@ impl Trade {
         let default = settings.training.method;
         let mut decoders = self.scene.decoders();
         decoders.retain(|kind| !kind.needs_sensor());
-        let methods = if self.method.is_empty() {
-            vec![default]
-        } else {
-            self.method.clone()
+        let methods = match &self.method[..] {
+            [] => &[default],
+            given => given,
         };
         let case = |(number, method): (usize, &Method)| {
             let mut settings = settings;

@@ -46,6 +46,12 @@ pub fn groups() -> [(&'static str, Vec<Term>); 7] {
     ]
 }
 
+/// Returns true if each word in `typed` occurs in the text, in any order.
+pub fn has_words(text: &str, typed: &str) -> bool {
+    let text = text.to_lowercase();
+    typed.split_whitespace().all(|word| text.contains(&word.to_lowercase()))
+}
+
 /// Term of the field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Term {
@@ -62,8 +68,7 @@ pub struct Term {
 impl Term {
     /// Returns true if each word in `typed` occurs in the name or the definition, in any order.
     pub fn matches(&self, typed: &str) -> bool {
-        let text = format!("{} {}", self.name, self.definition).to_lowercase();
-        typed.split_whitespace().all(|word| text.contains(&word.to_lowercase()))
+        has_words(&format!("{} {}", self.name, self.definition), typed)
     }
 }
 

@@ -21,6 +21,8 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2, Axis, Slice, Zip};
 use thiserror::Error;
 
+use super::timeline::Timeline;
+
 /// Test set of a run, ready to be drawn.
 #[derive(Clone, Debug)]
 pub struct TestView {
@@ -36,6 +38,8 @@ pub struct TestView {
     range: RangeInclusive<f64>,
     /// Rule of the division, which determines the order of the samples.
     order: SplitBy,
+    /// Where the samples are on an axis of time.
+    pub timeline: Arc<Timeline>,
 }
 
 /// Array of which all drawn row-wires are read in each snapshot, and the surface through its nodes.
@@ -115,6 +119,7 @@ impl TestView {
             skin: skin.map(Arc::new),
             through,
             range: low..=high,
+            timeline: Arc::new(Timeline::numbered(set.samples())),
             set,
             problem,
             order,

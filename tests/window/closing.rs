@@ -241,7 +241,7 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
     driver.click_button("Study");
     driver.click("Speed against accuracy");
     trading::tiny(&mut driver);
-    driver.type_into("Noise levels", "0");
+    driver.type_into("Noise levels (%)", "0");
     trading::measure(&mut driver);
     ask(&mut driver);
     assert!(driver.has("Study: Speed against accuracy") && driver.says("not exported as a table"));

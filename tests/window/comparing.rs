@@ -119,7 +119,8 @@ fn two_runs_are_compared_and_survive_a_restart() {
     assert!(driver.has("Six hidden nodes as A") && driver.has(&format!("{SECOND} as B")));
     check(&driver);
     assert!(driver.becomes_idle(), "an idle view draws nothing");
-    driver.click("Use the settings of Six hidden nodes");
+    driver.click("Open Six hidden nodes");
+    driver.wait("the run in Train", |driver| driver.shown() == "Train");
     assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));
 }
 
@@ -246,7 +247,7 @@ fn displayed_pictures_are_saved_in_the_format_of_their_extension() {
     driver.save("Surfaces, PNG", &at("a.png"));
     assert!(driver.says("Saved "), "{:#?}", driver.texts());
     driver.click("Dismiss");
-    let tabs = ["Loss", "Training state", "Histogram", "Regression", "Nodes"];
+    let tabs = ["Loss", "Histogram", "Regression", "Nodes"];
     let mut pictures = Vec::new();
     for tab in tabs {
         driver.click(tab);
@@ -258,7 +259,7 @@ fn displayed_pictures_are_saved_in_the_format_of_their_extension() {
         pictures.push(svg);
     }
     // The nodes: a square and a disc each, and one of both next to the plot.
-    assert_eq!(pictures[4].matches("<circle").count(), 60 + 1);
+    assert_eq!(pictures[3].matches("<circle").count(), 60 + 1);
     driver.save(CHART, &at("nodes.bmp"));
     assert!(driver.says("give a name that ends in .png or .svg"));
     let png = image::open(at("a.png")).unwrap();
@@ -369,7 +370,8 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     driver.click("Dismiss");
     assert!(fs::read_to_string(&picture).unwrap().contains("</svg>"));
     let name = driver.state().runs.workspace.runs[0].name.clone();
-    driver.click(&format!("Use the settings of {name}"));
+    driver.click(&format!("Open {name}"));
+    driver.wait("the run in Train", |driver| driver.shown() == "Train");
     assert_eq!(
         (driver.shown(), driver.state().settings().hidden),
         ("Train", kept[0].settings.hidden)

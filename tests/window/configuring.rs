@@ -8,10 +8,13 @@ use decoupler_core::{
     sensor::ArrayScale,
     training::Method,
 };
-use eframe::egui::{Key, Modifiers, accesskit::Role};
+use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
 use egui_kittest::kittest::NodeT as _;
 
-use crate::driver::{Driver, PATIENCE, small, table_of};
+use crate::{
+    driver::{Driver, PATIENCE, small, table_of},
+    every_view::CONTROLS,
+};
 
 #[test]
 fn the_window_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
@@ -143,7 +146,7 @@ fn typed_numbers_are_kept_within_their_limits() {
         ("Validation samples", "0"),
         ("Test samples", "40"),
         ("Epochs", "77"),
-        ("Seed", "18446744073709551615"),
+        ("Seed", "9007199254740991"),
         ("Largest compression", "12.5"),
         ("Mu", "1e-4"),
     ] {
@@ -165,7 +168,7 @@ fn typed_numbers_are_kept_within_their_limits() {
             draft.training.stopping.epochs,
             draft.seed.0
         ),
-        (40, 77, u64::MAX)
+        (40, 77, (1 << 53) - 1)
     );
     assert_eq!(draft.simulation().unwrap().scene.largest_compression, 0.125);
     let Method::LevenbergMarquardt(settings) = draft.training.method else {
@@ -294,4 +297,38 @@ fn keys_start_a_training_and_step_through_the_snapshots() {
         "training keeps the displayed snapshot"
     );
     driver.settle();
+}
+
+#[test]
+fn the_first_training_beats_the_linear_map() {
+    let mut driver = Driver::open_first(vec2(1440.0, 900.0));
+    driver.train();
+    driver.settle();
+    let praise = "times as accurate as the linear map";
+    let texts = driver.texts();
+    let text = texts.iter().find(|text| text.contains(praise));
+    let text = text.unwrap_or_else(|| panic!("{texts:#?}"));
+    // "On z 1.74 times as accurate…"
+    let times = text.split(' ').find_map(|word| word.parse::<f64>().ok()).unwrap();
+    assert!(times > 1.5, "{text}");
+}
+
+#[test]
+fn the_train_view_has_few_controls() {
+    let count = |driver: &mut Driver| {
+        let nodes = driver.harness().root().children_recursive();
+        nodes
+            .filter(|node| CONTROLS.contains(&node.accesskit_node().role()))
+            .count()
+    };
+    let mut driver = Driver::open_first(vec2(1440.0, 900.0));
+    driver.settle();
+    let visible = count(&mut driver);
+    for part in ["Scene", "Samples", "Advanced"] {
+        driver.click(part);
+    }
+    driver.settle();
+    let folded = count(&mut driver) - visible;
+    println!("{visible} controls are visible, {folded} folded");
+    assert!(visible <= 42 && folded <= 44, "{visible} visible, {folded} folded");
 }

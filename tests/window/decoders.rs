@@ -83,6 +83,7 @@ fn the_decoders_figures_are_the_librarys() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
+    driver.details();
     assert!(driver.has("Decoding a snapshot"));
     assert!(table(&driver).is_empty(), "folded away until asked for");
     driver.click("More decoders");
@@ -98,7 +99,6 @@ fn the_decoders_figures_are_the_librarys() {
 
     // The next training is measured automatically once it has ended.
     driver.click_button("Known");
-    driver.click("Noise on resistance");
     driver.enter("Relative noise", "0.1");
     assert_eq!(driver.state().draft, noisy());
     driver.train();
@@ -114,6 +114,7 @@ fn a_running_training_is_not_measured_until_it_is_paused() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
+    driver.details();
     driver.click("More decoders");
     wait_for_all(&mut driver);
     choose_method(&mut driver, "Momentum, Eq. (11)");

@@ -93,7 +93,9 @@ impl Driver {
     pub(crate) fn open_again(file: &Path, runs: &Path) -> Self {
         let (file, runs) = (WindowFile::read(file.to_owned()), runs.to_owned());
         let keeping = |window: DecouplerWindow| window.keeping_runs(runs);
-        Self::open_as(vec2(1440.0, 900.0), Some(file), keeping).on_the_papers_scene()
+        let mut driver = Self::open_as(vec2(1440.0, 900.0), Some(file), keeping);
+        driver.unfold();
+        driver
     }
 
     fn open_as(
@@ -565,6 +567,15 @@ impl Driver {
         });
     }
 
+    /// Unfolds the details of the result.
+    #[track_caller]
+    pub(crate) fn details(&mut self) {
+        if !self.has("COST") {
+            self.click("Details");
+            self.settle();
+        }
+    }
+
     /// Waits until the ended training is among the kept runs: its folder is written in the background.
     #[track_caller]
     pub(crate) fn wait_for_kept_run(&mut self) {
@@ -629,8 +640,11 @@ pub(crate) fn trained(settings: RunSettings) -> Run {
 pub(crate) fn table_of(run: &Run) -> Vec<String> {
     let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
     let tables = ErrorTable::of_scores(run.problem(), &run.scores().unwrap(), None);
+    // Coordinates that do not vary have no column.
+    let is_shown = |place: usize| place == 0 || tables[0].rows.iter().any(|row| row.errors[place] >= Some(1e-3));
     let cells = tables[0].rows.iter().flat_map(|row| {
-        let named = columns.iter().zip(&row.errors);
+        let named = columns.iter().zip(&row.errors).enumerate();
+        let named = named.filter(|(place, _)| is_shown(*place)).map(|(_, named)| named);
         named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(*value)))
     });
     cells.collect()

@@ -93,12 +93,11 @@ fn a_table_ends_with_the_librarys_own_numbers() {
             }
         }
     }
-    assert_eq!(compared, 2 * 8, "nothing is published for these sizes");
+    assert_eq!(compared, 2 * 7, "nothing is published for these sizes");
     let remarks = [describe_failures(&results), describe_worse_than_mean(&results)].concat();
     for remark in &remarks {
         assert!(driver.has(remark), "{remark}");
     }
-    assert_eq!(driver.has("Remarks"), !remarks.is_empty());
     driver.settle();
 
     for _ in 0..2 {
@@ -357,8 +356,14 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     driver.settle();
     assert!(driver.says("samples"), "the recording has no number of samples to vary");
     driver.choose("Down", "Scaling");
+    for scaling in ["Min-max", "Whitening"] {
+        driver.click(scaling);
+    }
+    assert!(driver.says("there are no values for scaling"), "{:#?}", driver.texts());
+    for scaling in ["Min-max", "Whitening"] {
+        driver.click(scaling);
+    }
     driver.type_into("Values across", "4 12");
-    driver.type_into("Values down", "minmax whiten");
     driver.enter("Epochs", "5");
     run_to_the_end(&mut driver);
     let alone = trained(&plan(&path));

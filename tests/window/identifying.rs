@@ -59,7 +59,7 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
         driver.assert_shows(&[sentence(&describe_target(name, target))]);
     }
     // A later change of the settings is reported.
-    assert!(!driver.says("have changed since"));
+    assert!(!driver.says("Result of the previous settings"));
     let hidden = setup.settings().hidden + 1;
     let changed = setup.with_settings(RunSettings {
         hidden,
@@ -67,7 +67,15 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
     });
     driver.window_mut().apply(Effect::TakeSetup(Box::new(changed)));
     driver.settle();
-    assert!(driver.says("have changed since"), "{:#?}", driver.texts());
+    assert!(driver.says("Result of the previous settings"), "{:#?}", driver.texts());
+    // Findings about another recording are not shown.
+    let mut other = plan.clone();
+    other.import.data = plan.import.data.with_file_name("other.csv");
+    fs::copy(&plan.import.data, &other.import.data).unwrap();
+    let other = Setup::recording(*setup.settings(), other);
+    driver.window_mut().apply(Effect::TakeSetup(Box::new(other)));
+    driver.settle();
+    assert!(!driver.says("analysed in"), "{:#?}", driver.texts());
 }
 
 #[test]

@@ -195,7 +195,7 @@ fn the_last_run_is_shown_after_a_restart_and_each_of_the_list_can_be_opened() {
     assert!(driver.says("Finished: "), "{:#?}", driver.texts());
     assert!(!driver.has("Train longer"), "its state is not kept");
     let bundle = folder.path().join("network.json");
-    driver.save("Best network, epoch 15, Network file", &bundle);
+    driver.save("Network file, JSON", &bundle);
     driver.wait("its network", |_| bundle.exists());
     driver.enter("Hidden nodes", "3");
     driver.train();

@@ -81,8 +81,8 @@ fn nouns_after_one_are_singular() {
         driver.texts()
     );
     driver.enter("Hidden nodes", "1");
-    driver.wait("the array", |driver| driver.says("1 unknown, 1 equation per frame"));
-    driver.wait("its readings", |driver| driver.says("1 row-wire × 1 column-wire"));
+    driver.act("Chart: Readings");
+    driver.wait("its readings", |driver| driver.has("Readings of the actual surface"));
     let texts = driver.texts();
     let plural = |text: &&String| {
         let words: Vec<&str> = text.split_whitespace().collect();

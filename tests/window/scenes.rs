@@ -3,7 +3,7 @@
 use decoupler::window::Effect;
 use decoupler_core::{
     dataset::Simulation,
-    evaluation::{Outlook, Preset, RunSettings},
+    evaluation::{Preset, RunSettings},
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Radii, Rows, Scene, TiltedBody},
     sensor::ArrayScale,
@@ -32,7 +32,6 @@ fn wait_for_scene(driver: &mut Driver) {
 fn known_rows_train_one_small_network_for_each_row() {
     let mut driver = Driver::open();
     driver.configure_small();
-    assert!(driver.has("60 unknowns, 180 equations per frame"));
     assert!(driver.has("18 inputs, 12 outputs, 198 weights"));
     driver.click_button("Known");
     // (18 + 1) · 6 + (6 + 1) · 6: x of a known row does not vary.
@@ -56,7 +55,6 @@ fn with_one_row_only_that_row_is_drawn() {
     driver.click_button("One");
     driver.enter("Row", "4");
     assert_eq!(driver.state().draft.simulation().unwrap().scene.rows, Rows::One(3));
-    assert!(driver.has("6 unknowns, 18 equations per frame"));
     wait_for_scene(&mut driver);
     assert_eq!(driver.views().train.drawing().unwrap().actual.nodes.len(), 6);
     assert!(driver.says("1 of 100"), "a snapshot is one sample");
@@ -83,7 +81,6 @@ fn with_one_row_only_that_row_is_drawn() {
 #[test]
 fn noise_inputs_and_scaling_reach_the_librarys_settings() {
     let mut driver = Driver::open();
-    driver.click("Noise on resistance");
     assert!(!driver.has("Noise in"), "it has no effect without noise");
     driver.enter("Relative noise", "0.1");
     driver.enter("Additive noise", "0.25");
@@ -124,8 +121,7 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
         },
         "and nothing else changed"
     );
-    driver.click("Noise on resistance");
-    assert!(driver.has("0.1 % relative, 0.25 Ω, 14 bits, 0.7 % drift, in test only"));
+    assert!(driver.says("random nodes, all rows, 0.1 % noise"));
     assert!(!driver.has("Published"), "the paper's figures are of another scene");
 }
 
@@ -133,7 +129,6 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
 fn a_training_with_noise_is_compared_with_the_limit_that_noise_sets() {
     let mut driver = Driver::open();
     driver.configure_small();
-    driver.click("Noise on resistance");
     driver.enter("Relative noise", "0.1");
     driver.enter("Training samples", "2000");
     driver.enter("Epochs", "40");
@@ -265,7 +260,6 @@ fn the_best_accuracy_sets_how_readings_are_decoded_and_the_paper_all_but_the_arr
     );
 
     // With noise the best network needs more samples, and the preset says so.
-    driver.click("Noise on resistance");
     driver.enter("Relative noise", "0.1");
     let noisy = Preset::Best.settings_in(Noise::relative(0.001));
     assert_ne!(noisy.simulation().unwrap().samples, best.simulation().unwrap().samples);
@@ -291,27 +285,15 @@ fn the_best_accuracy_sets_how_readings_are_decoded_and_the_paper_all_but_the_arr
 }
 
 #[test]
-fn scenes_that_move_sideways_report_their_condition_number() {
+fn scenes_that_move_sideways_are_reported_as_ill_conditioned() {
     let mut driver = Driver::open();
     driver.configure_small();
-    let condition = |driver: &Driver| {
-        let texts = driver.texts();
-        let text = texts.iter().find(|text| text.starts_with("Condition number"));
-        text.unwrap().clone()
-    };
-    let of = |settings: &RunSettings| {
-        let outlook = Outlook::of(settings.simulation().unwrap()).unwrap();
-        let number = format_number(outlook.worst_row.condition());
-        format!("Condition number {number}")
-    };
-    assert_eq!(condition(&driver), of(&driver.state().draft));
     assert!(!driver.says("ill-conditioned"));
     driver.click_button("x, y, z");
-    assert!(driver.has("180 unknowns, 180 equations per frame"));
     wait_for_scene(&mut driver);
-    assert_eq!(condition(&driver), of(&driver.state().draft));
     assert!(driver.says("even rounding hides it"));
     driver.train();
+    driver.details();
     assert!(driver.says("This scene is ill-conditioned (condition number"));
     let table = driver.table();
     // Exact readings leave this scene open: solving the equations for every row-wire would take too long.

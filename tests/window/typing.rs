@@ -148,14 +148,11 @@ fn a_double_click_sets_the_default_value() {
 }
 
 #[test]
-fn a_double_click_sets_every_slider_to_its_default_value() {
+fn a_double_click_sets_sliders_and_the_depth_to_their_defaults() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
     driver.wait_for_last_epoch();
-    double_click_slider(&mut driver, "Hidden nodes slider");
-    assert_eq!(driver.state().draft.hidden, 12);
-
     driver.get("Epoch of the displayed network").focus();
     driver.press(Key::ArrowLeft);
     assert!(driver.views().train.scrub.epoch().is_some());
@@ -164,6 +161,7 @@ fn a_double_click_sets_every_slider_to_its_default_value() {
 
     driver.enter("Depth", "0.2");
     assert_eq!(driver.views().train.press.finger.depth_share, 0.2);
-    double_click_slider(&mut driver, "Depth of the press");
+    let at = driver.get("Depth").rect().center();
+    double_click(&mut driver, at);
     assert_eq!(driver.views().train.press.finger.depth_share, 0.8);
 }

@@ -8,8 +8,8 @@ mod sensor;
 mod training;
 
 pub use network::{hidden_ui, workload_ui};
-pub use presets::{follow_preset, preset_ui};
-pub use scene::{SAMPLES, of_samples, of_scene, scene_ui, size_ui};
+pub use presets::{follow_preset, preset_between, preset_ui};
+pub use scene::{SAMPLES, of_samples, of_scene, scene_ui};
 pub use sensor::{array_ui, geometry_ui};
 pub use training::method_ui;
 
@@ -19,7 +19,6 @@ use decoupler_core::{
     evaluation::{RUN_OPTIONS, RunSettings, TrainingSize},
     scene::RowModel,
     settings::{Field, Kind, Setting, Value},
-    text::counted,
 };
 use eframe::egui::{Align, Align2, TextEdit, Ui, vec2};
 
@@ -74,7 +73,7 @@ pub enum Look {
 }
 
 /// Value of a setting in the table, and its text in the window.
-type Choice = (&'static str, &'static str);
+pub type Choice = (&'static str, &'static str);
 
 /// Value of a setting that has not been chosen yet.
 const AUTOMATIC: &str = "automatic";
@@ -122,13 +121,9 @@ pub fn advanced_ui(
     has_recorded_rows: bool,
     size: Option<TrainingSize>,
 ) {
-    let summary = |settings: &RunSettings| {
-        let epochs = counted(settings.training.stopping.epochs, "epoch");
-        format!("{}, {epochs}", network::of_inputs(settings))
-    };
     let summary = match fields.set_by {
-        SetBy::User => summary(fields.settings),
-        SetBy::Choice(chosen) => chosen.map_or_else(|| AUTOMATIC.to_owned(), summary),
+        SetBy::User => network::of_inputs(fields.settings),
+        SetBy::Choice(chosen) => chosen.map_or_else(|| AUTOMATIC.to_owned(), network::of_inputs),
     };
     fold_ui(ui, "Advanced", &summary, |ui| {
         ui.add_enabled_ui(is_new, |ui| {
@@ -201,6 +196,12 @@ impl Row {
             debug_assert!(set.is_ok(), "{set:?}");
         }
     }
+}
+
+/// Returns the values of a setting of the network or its training, and what the window calls them; none of a number.
+pub fn choices(setting: &str) -> Vec<Choice> {
+    let mut rows = network::INPUTS.iter().chain([&training::METHOD]);
+    rows.find(|row| row.0 == setting).map_or_else(Vec::new, Row::choices)
 }
 
 /// Returns the definition of a term.

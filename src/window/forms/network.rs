@@ -16,7 +16,7 @@ use crate::window::{
 
 const HIDDEN: Row = Row("hidden", "Hidden nodes", Look::Number(""));
 
-const INPUTS: [Row; 2] = [
+pub(super) const INPUTS: [Row; 2] = [
     Row(
         "inputs",
         "Inputs",

@@ -71,3 +71,9 @@ pub fn follow_preset(before: &RunSettings, settings: &mut RunSettings) {
         *settings = with_best(settings);
     }
 }
+
+/// Returns the name of the preset that leads from one of the settings to the other, if one does.
+pub fn preset_between(before: &RunSettings, after: &RunSettings) -> Option<&'static str> {
+    let preset = PRESETS.iter().find(|(.., change)| change(before) == *after);
+    preset.map(|(name, ..)| *name)
+}

@@ -2,20 +2,17 @@
 
 use decoupler_core::{
     dataset::Simulation,
-    evaluation::{Outlook, RunSettings},
-    scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene},
-    text::counted,
+    evaluation::RunSettings,
+    scene::{Indenter, IndenterShape, Loading, Movement, Noise, Rows, Scene},
 };
-use decoupler_files::export::format_number;
 use eframe::egui::Ui;
 
 use super::{Fields, Look, Row, network::ROWS};
 use crate::window::{
     glossary,
     widgets::{
-        dim_ui,
         fields::{capitalised, count_ui, in_percent, input_text, list_ui, percent_ui, quantity_ui},
-        fold_ui,
+        section_heading_ui,
     },
 };
 
@@ -84,14 +81,12 @@ pub fn scene_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
         let usual = Scene::default().largest_compression;
         percent_ui(ui, name, hint, &mut scene.largest_compression, usual, 0.001..=99.0);
     }
-    let noise = fields.settings.simulation().map(|simulation| simulation.scene.noise);
-    let noise = noise.unwrap_or_default();
-    fold_ui(ui, "Noise on resistance", &of_noise(noise), |ui| {
-        fields.show(ui, &NOISE);
-        if !noise.is_none() {
-            fields.show(ui, &[NOISY_SETS]);
-        }
-    });
+    section_heading_ui(ui, "Noise on resistance");
+    fields.show(ui, &NOISE);
+    let simulation = fields.settings.simulation();
+    if simulation.is_some_and(|simulation| !simulation.scene.noise.is_none()) {
+        fields.show(ui, &[NOISY_SETS]);
+    }
 }
 
 /// Shape and sizes of an indenter. A shape that the window does not offer, from a file, is shown and kept.
@@ -136,39 +131,6 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
     quantity_ui(ui, "Spread", hint, &mut indenter.spread_mm, 1e-3..=1e6, "mm");
 }
 
-/// The noise in a line: `0.1 % relative, 12 bits, in test only`.
-fn of_noise(noise: Noise) -> String {
-    let percent = |share: f64| input_text(in_percent(share));
-    let sources = [
-        (noise.relative > 0.0).then(|| format!("{} % relative", percent(noise.relative))),
-        (noise.additive_ohm > 0.0).then(|| format!("{} Ω", input_text(noise.additive_ohm))),
-        noise.converter_bits.map(|bits| format!("{bits} bits")),
-        (noise.drift > 0.0).then(|| format!("{} % drift", percent(noise.drift))),
-        (!noise.is_none() && noise.sets != NoisySets::Both).then(|| format!("in {} only", <&str>::from(noise.sets))),
-    ];
-    sources.into_iter().flatten().collect::<Vec<_>>().join(", ")
-}
-
-/// Numbers of unknowns and equations of the scene, and its condition number.
-pub fn size_ui(ui: &mut Ui, simulation: &Simulation, outlook: Option<&Outlook>) {
-    let scale = simulation.sensor.scale;
-    let rows = simulation.rows().unwrap_or(0);
-    let text = format!(
-        "{}, {} per frame",
-        counted(rows * simulation.scene.unknowns_per_row(scale), "unknown"),
-        counted(rows * scale.columns(), "equation")
-    );
-    dim_ui(ui, &text).on_hover_text(
-        "A frame is one reading of every row. Unknowns are the coordinates that vary in the scene; each resistance \
-         gives an equation, Eq. (2). What does not vary is not modelled.",
-    );
-    let condition = match outlook.map(|outlook| outlook.worst_row.condition()) {
-        Some(condition) if condition.is_infinite() => "infinite".to_owned(),
-        condition => format_number(condition),
-    };
-    dim_ui(ui, &format!("Condition number {condition}")).on_hover_text(glossary::CONDITION_NUMBER.hint);
-}
-
 /// Loading, rows, axes and noise.
 pub fn of_scene(scene: &Scene) -> String {
     let loading = match scene.loading {
@@ -181,7 +143,11 @@ pub fn of_scene(scene: &Scene) -> String {
         rows => format!("{rows} rows"),
     };
     let axes = if scene.movement == Movement::Z { "" } else { ", x y z" };
-    let noise = if scene.noise.is_none() { "" } else { ", noise" };
+    let noise = match scene.noise {
+        noise if noise.is_none() => String::new(),
+        Noise { relative, .. } if relative > 0.0 => format!(", {} % noise", input_text(in_percent(relative))),
+        _ => ", noise".to_owned(),
+    };
     format!("{loading}, {rows}{axes}{noise}")
 }
 
@@ -189,20 +155,4 @@ pub fn of_scene(scene: &Scene) -> String {
 pub fn of_samples(settings: &RunSettings) -> String {
     let [training, validation, test, seed] = SAMPLES.map(|row| row.text(settings).unwrap_or_default());
     format!("{training} + {validation} + {test}, seed {seed}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn noise_is_summarised_in_a_line() {
-        let noise = Noise {
-            relative: 0.07,
-            converter_bits: Some(12),
-            sets: NoisySets::Test,
-            ..Noise::default()
-        };
-        assert_eq!(of_noise(noise), "7 % relative, 12 bits, in test only");
-    }
 }

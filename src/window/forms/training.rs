@@ -6,7 +6,7 @@ use eframe::egui::Ui;
 use super::{Fields, Look, Row, SetBy, number_ui};
 use crate::window::widgets::{dim_ui, fields::capitalised, section_heading_ui};
 
-const METHOD: Row = Row(
+pub(super) const METHOD: Row = Row(
     "method",
     "Method",
     Look::Below(|| Vec::from(Method::all().map(|method| (method.short_name(), method.name())))),

@@ -14,11 +14,11 @@ use crate::window::{
         SourceKind, ToCopy, ViewKind,
     },
     theme,
-    training_worker::{Asked, LOST, Origin, Request, RunView, TrainedRun},
+    training_worker::{LOST, Origin, Request, RunView, TrainedRun},
     views::CHECKPOINT,
 };
-use decoupler_core::evaluation::RunSettings;
-use decoupler_files::import::{Plan, Setup};
+use decoupler_core::{evaluation::RunSettings, training::StopReason};
+use decoupler_files::import::Setup;
 
 impl DecouplerWindow {
     /// Applies an effect requested by a view.
@@ -43,7 +43,7 @@ impl DecouplerWindow {
             Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
             Effect::ChooseSource(_) => {}
             Effect::TakeSetup(setup) => self.take_setup(&setup),
-            Effect::ShowTraining => self.show(ViewKind::Train),
+            Effect::Show(view) => self.show(view),
             Effect::OpenRun(id) => self.open_run(id, true),
             Effect::Train => match shared.setup() {
                 Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
@@ -80,6 +80,7 @@ impl DecouplerWindow {
                 self.worker.ask(Request::Continue(shared.settings().training));
             }
             Effect::Continue => {}
+            Effect::UseRidge => self.worker.ask(Request::UseRidge),
             Effect::Stop => {
                 self.worker.ask(Request::Stop);
                 // The training being prepared does not begin; the previous one stays.
@@ -151,14 +152,10 @@ impl DecouplerWindow {
         }
         if !is_chosen {
             let Ok(asked) = shared.asked() else { return };
-            // The history of readings may have been chosen with the settings.
-            let samples = |asked: &Asked| {
-                let mut plan = Plan::clone(asked.plan.as_ref()?);
-                plan.import.memory = None;
-                Some(plan)
+            let has_same = match (&asked.plan, run.setup.plan()) {
+                (Some(plan), Some(of_run)) => plan.files() == of_run.files(),
+                _ => have_same_test_set(&asked.settings, run.settings()),
             };
-            let has_same = samples(&asked) == samples(&run.asked)
-                && (asked.plan.is_some() || have_same_test_set(&asked.settings, run.settings()));
             if !has_same || shared.run.is_some() {
                 return;
             }
@@ -166,17 +163,11 @@ impl DecouplerWindow {
                 run.asked = asked;
             }
         }
-        let setup = run.setup.clone();
-        shared.run = Some(run);
-        shared.phase = shared.phase_at_rest();
+        let reason = run.stop_reason.unwrap_or(StopReason::Stopped);
+        self.show_run(run, Phase::Ended(reason), is_chosen);
         if is_chosen {
             self.opened = None;
-            self.take_setup(&setup);
             self.show(ViewKind::Train);
-        }
-        self.share_plan();
-        if self.shared.source == SourceKind::Array {
-            self.request_preview();
         }
     }
 
@@ -251,7 +242,7 @@ impl DecouplerWindow {
     /// asked, but does not know which files are in use.
     pub(super) fn answer(&mut self, task: FileTask, path: PathBuf, asks: bool) {
         match &task.purpose {
-            Purpose::Save(contents) => {
+            Purpose::Save(contents) | Purpose::Decode(contents) => {
                 let (send, taken) = channel();
                 let (run, contents) = (contents.run, contents.clone());
                 let take = move |trained: Result<Option<&TrainedRun>, &str>| {
@@ -271,7 +262,11 @@ impl DecouplerWindow {
                     }
                     None => take(Ok(None)),
                 }
-                let used = self.files_in_use(&task);
+                let used = if task.is_read() {
+                    Vec::new()
+                } else {
+                    self.files_in_use(&task)
+                };
                 self.files.write(ToWrite { task, path, asks }, used, move |path| {
                     let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
                     taken?(path)

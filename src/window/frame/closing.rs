@@ -57,7 +57,7 @@ impl DecouplerWindow {
             closing.is_decided = true;
         }
         if keeps_training {
-            self.worker.saver()();
+            self.worker.save();
         } else {
             self.worker.forget();
         }

@@ -109,41 +109,39 @@ impl DecouplerWindow {
         }
     }
 
-    /// Shows a training that has begun. If one from a checkpoint has ended, its next event says so.
-    fn take_begun(&mut self, began: RunView, start: Start) {
-        let setup = began.setup.clone();
+    /// Shows another training, on the left its setup too if `takes_setup`.
+    pub(super) fn show_run(&mut self, run: RunView, phase: Phase, takes_setup: bool) {
+        let setup = run.setup.clone();
         self.shared.preview = None;
         self.previews.abandon();
-        self.shared.run = Some(RunView {
-            // The checkpoint of one that was cut short is removed when the window closes.
-            is_saved: start == Start::Paused,
-            ..began
-        });
-        if start != Start::New {
+        self.shared.run = Some(run);
+        if takes_setup {
             self.take_setup(&setup);
         }
-        self.share_plan();
-        self.shared.phase = match start {
-            Start::Paused => Phase::Paused,
-            Start::New | Start::Resumed => Phase::Training,
-        };
-    }
-
-    /// Shares the plan on the left with the training, if they have the same.
-    pub(super) fn share_plan(&mut self) {
+        // The same plan is shared, not compared in every frame.
         let asked = self.shared.asked();
         if let (Some(run), Ok(asked)) = (&mut self.shared.run, asked)
             && run.asked == asked
         {
             run.asked = asked;
         }
+        self.shared.phase = phase;
     }
 
     fn take_event(&mut self, event: Event) {
         let shared = &mut self.shared;
         shared.preparing = None;
         match event {
-            Event::Began(_, start, Ok(began)) => self.take_begun(*began, start),
+            Event::Began(_, start, Ok(began)) => {
+                // If one from a checkpoint has ended, its next event says so.
+                let phase = match start {
+                    Start::Paused => Phase::Paused,
+                    Start::New | Start::Resumed => Phase::Training,
+                };
+                // The checkpoint of one that was cut short is removed when the window closes.
+                let is_saved = start == Start::Paused;
+                self.show_run(RunView { is_saved, ..*began }, phase, start != Start::New);
+            }
             Event::Began(_, start, Err(reason)) => {
                 let matter = if start == Start::New {
                     Matter::Settings

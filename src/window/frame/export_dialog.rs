@@ -4,7 +4,7 @@
 use decoupler_files::export::TableForm;
 use eframe::egui::{Align, Layout, Response, RichText, Ui, containers::menu::MenuButton};
 
-use super::modal::{Reply, card_ui};
+use super::modal::{Reply, card_ui, take_focus};
 use crate::window::{
     shared::{Effect, ExportLine, Exporting, Format, Item, Shown},
     theme::{semibold, space, type_size},
@@ -94,9 +94,7 @@ pub(super) fn export_dialog_ui(ui: &Ui, exporting: &mut Exporting, shown: Vec<Sh
             let button = primary_button(if is_copy { "Copy" } else { "Save…" });
             let button = ui.add_enabled(chosen.is_some(), button);
             // Enter is enough; Tab still reaches the lists.
-            if ui.memory(|memory| memory.focused().is_none()) {
-                button.request_focus();
-            }
+            take_focus(ui, &button);
             let is_left = ui.add(ghost_button("Cancel")).clicked();
             let chosen = chosen.filter(|_| button.clicked());
             let effect = chosen.and_then(|(shown, format)| export(shown, format, exporting));

@@ -9,6 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use decoupler_files::export::exit_leaving_nothing;
 use directories::ProjectDirs;
 use eframe::{
     NativeOptions,
@@ -21,10 +22,13 @@ use super::{
     DecouplerWindow, Desktop,
     remembered::{MIN_SIZE_POINTS, WindowFile},
 };
-use crate::window::{
-    job::{Background, JobError, Wake, start_thread},
-    shared::{FileInUse, FileTask, Matter, ViewKind, refuse_in_use},
-    theme::{Theme, radius, space, type_size},
+use crate::{
+    signals::on_termination,
+    window::{
+        job::{Background, JobError, Wake, start_thread},
+        shared::{FileInUse, FileTask, Matter, ViewKind, refuse_in_use},
+        theme::{Theme, radius, space, type_size},
+    },
 };
 
 /// Longest time that dropping waits for a file. A file that takes longer is removed when the program ends.
@@ -104,7 +108,7 @@ impl Files {
     ) {
         let (path, asks) = (to_write.path.clone(), to_write.asks);
         // A folder is never replaced as a whole; a file that is being written counts as existing.
-        let asks = asks && !to_write.task.words.extensions.is_empty();
+        let asks = asks && !to_write.task.is_read() && !to_write.task.words.extensions.is_empty();
         let is_under_way = self.paths().any(|other| other == path);
         let work = move || match refuse_in_use(&path, &used) {
             Err(reason) => Written::InUse(reason),
@@ -300,7 +304,8 @@ pub fn open(files: Vec<PathBuf>) -> Result<(), OpenError> {
                 .keeping_trainings(folders.data_dir().to_owned(), CHECKPOINT_INTERVAL),
             None => window,
         };
-        window.save_on_termination();
+        // The last checkpoint of a running training stays.
+        on_termination(|status| exit_leaving_nothing(i32::from(status)));
         Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))
     };
     // A missing library makes the window system panic with the name of the library.

@@ -1,6 +1,6 @@
 use eframe::egui::{FontId, Label, RichText, ScrollArea, TextEdit, TextStyle, Ui, WidgetInfo, accesskit::Role, vec2};
 
-use super::modal::{Reply, card_ui};
+use super::modal::{Reply, card_ui, take_focus};
 use crate::window::{
     glossary::{self, Term},
     shared::Offer,
@@ -99,7 +99,7 @@ fn glossary_ui(ui: &mut Ui, typed: &mut String) {
         .desired_width(f32::INFINITY);
     let field = ui.add(field);
     field.widget_info(|| WidgetInfo::labeled(Role::SearchInput, true, "Term"));
-    field.request_focus();
+    take_focus(ui, &field);
     ui.add_space(space(1));
     let scroll = ScrollArea::vertical()
         .max_height(space(112))

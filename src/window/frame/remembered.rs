@@ -11,7 +11,7 @@ use decoupler_core::{
 use decoupler_files::{
     export::{WriteError, atomic_write},
     figure::SequentialMap,
-    machine::{memory_budget, system_cause},
+    machine::memory_budget,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -70,17 +70,12 @@ pub struct WindowFile {
 }
 
 impl WindowFile {
-    /// Reads the file at `path`; a missing file counts as empty. One that cannot be read is kept under another name.
+    /// Reads the file at `path`; a missing file counts as empty.
     pub fn read(path: PathBuf) -> Self {
         let remembered = Remembered::read(&path);
         let damage = remembered.is_none().then(|| {
-            let kept = path.with_extension("json.damaged");
-            let kept_as = match fs::rename(&path, &kept) {
-                Ok(()) => format!("it is kept as '{}'", kept.display()),
-                Err(error) => format!("it cannot be kept as '{}': {}", kept.display(), system_cause(&error)),
-            };
             let path = path.display();
-            format!("View, theme and settings of the last start are not restored: '{path}' is damaged; {kept_as}")
+            format!("View, theme and settings of the last start are not restored: '{path}' is damaged")
         });
         Self {
             path,

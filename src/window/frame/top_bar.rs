@@ -1,4 +1,4 @@
-use eframe::egui::{Align, Label, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Id, Label, RichText, Ui, WidgetInfo, accesskit::Role};
 
 use crate::window::{
     shared::{Command, Offer, ViewKind},
@@ -12,8 +12,10 @@ const WIDE: f32 = 1280.0;
 /// Width below which the names of the views are closer together.
 const TIGHT: f32 = 1100.0;
 
-/// Name, views, and the tools of the displayed view, which `tools_ui` lays out from right to left, before the tools of the
-/// window itself. Returns the command that the user clicked.
+/// Width below which the column on the left is hidden at first, and only what has no keys is left.
+pub(super) const SMALL: f32 = 800.0;
+
+/// Name, views, and at the right end the tools of the displayed view, before those of the window itself. Returns the command that the user clicked.
 pub(super) fn top_bar_ui(
     ui: &mut Ui,
     shown: ViewKind,
@@ -37,22 +39,35 @@ pub(super) fn top_bar_ui(
             let views = ViewKind::ALL.map(|view| (view, view.name()));
             segmented_ui(ui, "View", &views, shown, false)
         };
-        let picked = ui.scope(views_ui).inner.map(Command::Show);
-        let reached = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        let form = (width < SMALL).then(|| command_button_ui(ui, offers, Command::Form, "☰"));
+        let picked = ui.scope(views_ui).inner.map(Command::Show).or(form.flatten());
+        // They keep the order of reading, which the Tab key follows; their width is that of the frame before.
+        let id = Id::unique("width of the tools");
+        let before = ui.data(|data| data.get_temp(id)).unwrap_or(0.0);
+        ui.add_space((ui.available_width() - before).max(0.0));
+        let reached = ui.horizontal(|ui| {
+            ui.set_height(space(7));
             let mut reached = None;
             let mut button_ui = |ui: &mut Ui, command: Command, text: &str| {
                 reached = reached.take().or(command_button_ui(ui, offers, command, text));
             };
-            button_ui(ui, Command::Keys, "?");
-            button_ui(ui, Command::Search, if is_wide { "Search" } else { "…" });
-            if is_wide {
-                button_ui(ui, Command::Redo, "↻");
-                button_ui(ui, Command::Undo, "↺");
-                ui.add_space(space(2));
-            }
             tools_ui(ui);
+            if is_wide {
+                ui.add_space(space(2));
+                button_ui(ui, Command::Undo, "↺");
+                button_ui(ui, Command::Redo, "↻");
+            }
+            button_ui(ui, Command::Search, if is_wide { "Search" } else { "…" });
+            if width >= SMALL {
+                button_ui(ui, Command::Keys, "?");
+            }
             reached
         });
+        let now = reached.response.rect.width();
+        if (now - before).abs() > 0.5 {
+            ui.data_mut(|data| data.insert_temp(id, now));
+            ui.ctx().request_discard("other tools");
+        }
         picked.or(reached.inner)
     })
     .inner

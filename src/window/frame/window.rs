@@ -1,7 +1,8 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
-use decoupler_files::export::exit_leaving_nothing;
-use eframe::egui::{self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder};
+use eframe::egui::{
+    self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder, ViewportCommand, vec2,
+};
 
 use super::{
     commands::{DraftsUndoer, SCALES, drafts},
@@ -10,20 +11,16 @@ use super::{
     modal::Modal,
     notices::Notices,
     remembered::{Memory, Remembered, WindowFile},
-    top_bar::top_bar_ui,
+    top_bar::{SMALL, top_bar_ui},
 };
-use crate::{
-    signals::on_termination,
-    window::{
-        job::{Background, Wake},
-        preview::PreviewEvent,
-        shared::{
-            Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status,
-        },
-        theme::{self, Theme, space},
-        training_worker::{Request, Worker},
-        views::Views,
-    },
+use crate::window::{
+    job::{Background, Wake},
+    preview::PreviewEvent,
+    shared::{Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
+    theme::{self, Theme, space},
+    training_worker::{Request, Worker},
+    views::Views,
+    widgets::focus_ring_ui,
 };
 
 /// A picture to be copied, and the message for the user.
@@ -60,6 +57,10 @@ pub struct DecouplerWindow {
     pub(super) ctx: Context,
     /// Files that the window was opened with.
     pub(super) given: Vec<PathBuf>,
+    /// True until the first frame.
+    is_new: bool,
+    /// True while the column on the left is shown in a narrow window too.
+    pub(super) shows_form: bool,
 }
 
 impl DecouplerWindow {
@@ -119,6 +120,8 @@ impl DecouplerWindow {
             wake,
             ctx: ctx.clone(),
             given: Vec::new(),
+            is_new: true,
+            shows_form: false,
         };
         if let Some(damage) = damage {
             window.notices.fail(Matter::Memory, damage);
@@ -154,15 +157,6 @@ impl DecouplerWindow {
         }
     }
 
-    /// Saves the running training and ends the program on SIGTERM and SIGHUP, even if the window does not respond.
-    pub(super) fn save_on_termination(&self) {
-        let save = self.worker.saver();
-        on_termination(move |status| {
-            save();
-            exit_leaving_nothing(i32::from(status));
-        });
-    }
-
     /// State that all views read.
     pub fn shared(&self) -> &Shared {
         &self.shared
@@ -189,6 +183,9 @@ impl DecouplerWindow {
         if ui.input(|input| input.events.contains(&Event::WindowFocused(true))) {
             self.runs.ask(RunsRequest::Look);
         }
+        if std::mem::take(&mut self.is_new) {
+            self.fit_the_screen();
+        }
         let mut effects = Vec::new();
         let offers = self.take_commands(ui.ctx(), &mut effects);
         self.take_dropped(ui.ctx());
@@ -198,7 +195,7 @@ impl DecouplerWindow {
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
         // Widths of the columns at which their names do not touch their values, and at which the table fits.
         let [form_min, report_min] = [space(62), space(82)];
-        let has_report = kind.has_report(ui.available_width());
+        let has_report = shared.has_report(ui.available_width());
         // Wider columns must leave the middle this width.
         let within = |min: f32, max: f32, room: f32| Rangef::new(min, (room - space(176)).clamp(min, max));
         let for_form = ui.available_width() - if has_report { report_min } else { 0.0 };
@@ -214,27 +211,34 @@ impl DecouplerWindow {
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
                 top_bar_ui(ui, kind, &offers, |ui| {
-                    export_menu_ui(ui, || view.shown(shared), &mut effects);
                     view.tools_ui(ui, shared, &mut effects);
+                    export_menu_ui(ui, || view.shown(shared), &mut effects);
                 })
             });
         let status_line = Panel::bottom("status line")
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| ui.max_rect());
-        let form = Panel::left("configuration")
-            .default_size(self.chosen.form_points.unwrap_or(space(68)))
-            .size_range(within(form_min, space(110), for_form))
-            .frame(panel(side))
-            .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
-        self.chosen.form_points = Some(form.response.rect.width());
+        // A narrow window does not change the width in a wide one.
+        let is_narrow = ui.available_width() < 1400.0;
+        let shows_form = self.shows_form || ui.available_width() >= SMALL;
+        let form = shows_form.then(|| {
+            Panel::left(if is_narrow { "narrow form" } else { "form" })
+                .default_size(self.chosen.form_points.unwrap_or(space(68)))
+                .size_range(within(form_min, space(110), for_form))
+                .frame(panel(side))
+                .show(ui, |ui| view.form_ui(&mut inside(ui), shared, &mut effects))
+        });
+        if let Some(form) = form.filter(|_| !is_narrow) {
+            self.chosen.form_points = Some(form.response.rect.width());
+        }
         let report = has_report.then(|| {
             let for_report = ui.available_width();
             Panel::right("report")
                 .default_size(self.chosen.report_points.unwrap_or(space(96)))
                 .size_range(within(report_min, space(140), for_report))
                 .frame(panel(side))
-                .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
+                .show(ui, |ui| view.report_ui(&mut inside(ui), shared, &mut effects))
         });
         if let Some(report) = &report {
             self.chosen.report_points = Some(report.response.rect.width());
@@ -248,6 +252,12 @@ impl DecouplerWindow {
         let parts = [Some(&middle.response), report.as_ref().map(|report| &report.response)];
         for part in parts.into_iter().flatten() {
             card_menu_ui(part, || view.shown(shared), &mut effects);
+        }
+        let focused = ui.memory(|memory| memory.focused());
+        let focused = focused.and_then(|id| ui.ctx().read_response(id));
+        // The edge of a column.
+        if let Some(edge) = focused.filter(|focused| focused.rect.height() >= middle.response.rect.height()) {
+            focus_ring_ui(ui, &edge);
         }
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
@@ -266,12 +276,27 @@ impl DecouplerWindow {
         self.take_close_request();
     }
 
+    /// Fills the screen if the window would reach beyond it with its title bar: its status line would be out of sight.
+    fn fit_the_screen(&self) {
+        let size = self.ctx.content_rect().size() + vec2(0.0, space(18));
+        let screen = self.ctx.input(|input| input.viewport().monitor_size);
+        if screen.is_some_and(|screen| size.x > screen.x || size.y > screen.y) {
+            self.ctx.send_viewport_cmd(ViewportCommand::Maximized(true));
+        }
+    }
+
     /// Applies the effects requested by views.
     pub(super) fn apply_all(&mut self, effects: Vec<Effect>) {
         for effect in effects {
             self.apply(effect);
         }
     }
+}
+
+/// Returns a part of a column that does not widen it.
+fn inside(column: &mut Ui) -> Ui {
+    column.set_min_size(column.available_size());
+    column.new_child(UiBuilder::new().max_rect(column.max_rect()))
 }
 
 /// Returns `true` if the user did something in this frame that parts of the window already drawn may depend on: one

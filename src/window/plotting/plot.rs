@@ -3,11 +3,11 @@
 
 use decoupler_files::figure::{Form, Ink, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Scale, Series};
 use eframe::egui::{
-    Color32, FontId, Id, Label, Popup, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2,
-    WidgetInfo, accesskit::Role,
+    Color32, FontId, Id, Label, Painter, Popup, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, TextWrapMode,
+    Ui, UiBuilder, Vec2, WidgetInfo, accesskit::Role,
 };
 use egui_plot::{
-    AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
+    AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, FilledArea, GridInput, GridMark, HLine, HoverPosition, Line,
     LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span, VLine,
 };
 
@@ -17,8 +17,9 @@ use crate::window::{
     widgets::{dim_ui, focus_ring_ui},
 };
 
-/// Opacity of a shaded span of an axis.
+/// Opacity of a shaded span of an axis, and of a band.
 const SPAN_TINT: f32 = 0.12;
+const BAND_TINT: f32 = 0.22;
 /// Room for the number at a tick, in points.
 const NUMBER: [f64; 2] = [50.0, 16.0];
 /// Minimum distance of grid lines, in points; the plot derives its scale from it.
@@ -36,6 +37,8 @@ pub struct DrawnPlot<'a> {
     pub hovered: Option<usize>,
     /// Index of the item that was clicked in this frame.
     pub clicked: Option<usize>,
+    /// Its response to the pointer.
+    pub response: Response,
     transform: PlotTransform,
 }
 
@@ -44,6 +47,11 @@ impl DrawnPlot<'_> {
     pub fn position(&self, x: f64, y: f64) -> Option<Pos2> {
         let [x, y] = self.plot.place(x, y)?;
         Some(self.transform.position_from_point(&Place::new(x, y)))
+    }
+
+    /// Returns the place on the horizontal axis of a screen position.
+    pub fn place_at(&self, at: Pos2) -> f64 {
+        self.transform.value_from_position(at).x
     }
 
     /// Returns the item at a screen position: the bar there, or the nearest point within reach.
@@ -76,6 +84,11 @@ pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
     plots_ui(ui, title, figure);
 }
 
+/// Room for the names and the numbers of plots below each other, and for their horizontal axis.
+const NAME: f32 = space(18);
+const NUMBERS: f32 = space(12);
+const AXIS: f32 = space(9);
+
 /// Minimum width of the legend and the notes next to a square plot.
 const NOTES_WIDTH: f32 = space(48);
 
@@ -101,22 +114,50 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
         // Apart from the numbers at the axes.
         width = width.min(whole.height() + space(3));
     }
+    let height = (whole.height() - AXIS) / count;
     let slot = |index: usize| {
+        if figure.is_stacked {
+            let top = whole.top() + height * index as f32;
+            let is_last = index + 1 == figure.plots.len();
+            let bottom = if is_last {
+                whole.bottom()
+            } else {
+                top + height - space(2)
+            };
+            return Rect::from_x_y_ranges(whole.x_range(), top..=bottom);
+        }
         let left = whole.left() + (width + space(3)) * index as f32;
         Rect::from_min_size([left, whole.top()].into(), Vec2::new(width, whole.height()))
     };
+    let widths = figure
+        .plots
+        .iter()
+        .map(|plot| measure(ui.painter(), &plot.y.name).x + space(6));
+    let names = widths.fold(0.0, f32::max).min(NAME);
     let plots = figure.plots.iter().enumerate().map(|(index, plot)| {
-        let mut slot = ui.new_child(UiBuilder::new().max_rect(slot(index)));
-        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot);
+        let is_last = index + 1 == figure.plots.len();
+        let mut slot = slot(index);
+        if figure.is_stacked {
+            let place = slot.with_max_x(slot.left() + names).shrink2(Vec2::new(0.0, space(2)));
+            let name = Label::new(RichText::new(&plot.y.name).size(type_size().note)).wrap();
+            let mut beside = ui.new_child(UiBuilder::new().max_rect(place));
+            beside.set_clip_rect(place);
+            beside.add(name);
+            slot.min.x += names;
+        }
+        let track = figure.is_stacked.then_some(is_last);
+        let mut slot = ui.new_child(UiBuilder::new().max_rect(slot));
+        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, track);
         let mut drawn = DrawnPlot {
             plot,
             has_pointer: response.contains_pointer(),
             hovered: None,
             clicked: None,
+            response,
             transform,
         };
-        drawn.hovered = response.hover_pos().and_then(|at| drawn.item_at(at));
-        drawn.clicked = drawn.hovered.filter(|_| response.clicked());
+        drawn.hovered = drawn.response.hover_pos().and_then(|at| drawn.item_at(at));
+        drawn.clicked = drawn.hovered.filter(|_| drawn.response.clicked());
         drawn
     });
     let plots = plots.collect();
@@ -138,50 +179,77 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = space(1);
         for (name, look) in keys {
+            // A line and its name stay together.
+            let width = 1.2 * measure(ui.painter(), name).x + space(7);
+            let whole = width <= ui.max_rect().width();
+            if ui.available_size_before_wrap().x < width {
+                ui.end_row();
+            }
             let (place, _) = ui.allocate_exact_size(Vec2::splat(space(4)), Sense::hover());
             paint(
                 ui.painter(),
                 palette,
                 &look.sample(to_glam(place.left_center()), place.width()),
             );
-            ui.add(Label::new(RichText::new(name).size(type_size().note).color(palette.dim)).extend());
+            let name = Label::new(RichText::new(name).size(type_size().note).color(palette.dim));
+            ui.add(name.wrap_mode(match whole {
+                true => TextWrapMode::Extend,
+                false => TextWrapMode::Truncate,
+            }));
             ui.add_space(space(2));
         }
     });
 }
 
-/// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window.
-fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot) -> (PlotTransform, Response) {
+/// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window. `track` is whether a plot among
+/// several below each other is the last one, which has the horizontal axis of all.
+fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
-    let axis_hints = |hints: AxisHints<'static>, axis: &PlotAxis, apart: f32| {
+    let painter = ui.painter().clone();
+    let axis_hints = |hints: AxisHints<'static>, (axis, length): (&PlotAxis, f32), apart: f32| {
         let described = axis.clone();
         hints
-            .label(RichText::new(&axis.name).size(type_size().small).color(palette.dim))
+            .label(
+                RichText::new(shortened(&painter, &axis.name, length))
+                    .size(type_size().small)
+                    .color(palette.dim),
+            )
             .formatter(move |mark, _| described.tick_text(mark.value, mark.step_size))
             // Numbers have full brightness wherever they fit.
             .label_spacing(Rangef::new(apart, apart + 1.0))
             .tick_label_color(palette.dim)
             .tick_label_font(FontId::proportional(type_size().small))
     };
+    // Plots below each other are moved together by whoever draws them.
+    let may_move = track.is_none();
+    let mut y_hints = axis_hints(AxisHints::new_y(), (&plot.y, space.y), 12.0);
+    if track.is_some() {
+        // The names are beside the plots, and their frames are below each other.
+        y_hints = y_hints.label("").min_thickness(NUMBERS);
+    }
     // A menu over the plot is not covered by tooltips.
     let is_covered = Popup::is_any_open(ui.ctx());
     let mut shown = egui_plot::Plot::new(id)
         .id(id)
         .width(space.x)
         .height(space.y)
-        .custom_x_axes(vec![axis_hints(AxisHints::new_x(), &plot.x, 24.0)])
-        .custom_y_axes(vec![axis_hints(AxisHints::new_y(), &plot.y, 12.0)])
-        .show_axes([true, plot.y.scale != Scale::Hidden])
+        .custom_x_axes(vec![axis_hints(AxisHints::new_x(), (&plot.x, space.x), 24.0)])
+        .custom_y_axes(vec![y_hints])
+        .show_axes([track != Some(false), plot.y.scale != Scale::Hidden])
         .x_grid_spacer(|input| marks(&plot.x, &input, NUMBER[0]))
         .y_grid_spacer(|input| marks(&plot.y, &input, NUMBER[1]))
         .grid_spacing(Rangef::new(MIN_GRID, 300.0))
         .show_background(false)
         .grid_color(palette.line)
         .allow_scroll(false)
+        .allow_drag(may_move)
+        .allow_zoom(may_move)
+        .allow_boxed_zoom(may_move)
+        .allow_double_click_reset(may_move)
         .show_crosshair(false)
-        .label_formatter(|position| tooltip_at(plot, position).filter(|_| !is_covered))
+        .label_formatter(|position| tooltip_at(plot, position).filter(|_| may_move && !is_covered))
         .set_margin_fraction(Vec2::ZERO)
         .include_x(*x.start())
         .include_x(*x.end())
@@ -191,6 +259,9 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot) -> (PlotTransform, Response) {
         shown = shown.data_aspect(1.0);
     }
     let shown = shown.show(ui, |plot_ui| {
+        if let (Some(_), [.., from, to]) = (track, &plot.x.includes[..]) {
+            plot_ui.set_plot_bounds_x(*from..=*to);
+        }
         lines_behind(plot_ui, plot, &palette);
         for series in &plot.series {
             draw_series(plot_ui, plot, series, &palette);
@@ -211,6 +282,15 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot) -> (PlotTransform, Response) {
     let labels = plot.lay_out_labels(bounds(frame), at, &|text| measure(ui.painter(), text));
     paint_over(ui, frame, &labels);
     (shown.transform, shown.response)
+}
+
+/// Returns the beginning of a name that fits into this length of an axis, apart from the numbers of the other.
+fn shortened(painter: &Painter, name: &str, length: f32) -> String {
+    let fits = |text: &str| measure(painter, text).x <= length - NUMBERS;
+    let ends = name.char_indices().map(|(end, _)| end).rev();
+    let shorter = ends.map(|end| format!("{}…", name[..end].trim_end()));
+    let mut texts = std::iter::once(name.to_owned()).chain(shorter);
+    texts.find(|text| fits(text)).unwrap_or_default()
 }
 
 /// Returns the visible ticks.
@@ -274,6 +354,14 @@ fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
 fn draw_series(plot_ui: &mut PlotUi<'_>, plot: &Plot, series: &Series, palette: &Palette) {
     let name = &*series.name;
     let colour = colour(series.look.ink, palette);
+    if series.form == Form::Band {
+        for band in plot.bands(series) {
+            let [xs, low, high] = [0, 1, 2].map(|part| Vec::from_iter(band.iter().map(|ends| ends[part])));
+            let area = FilledArea::new(name, &xs, &low, &high).fill_color(colour.gamma_multiply(BAND_TINT));
+            plot_ui.add(area.allow_hover(false));
+        }
+        return;
+    }
     let [x_range, y_range] = plot.ranges();
     let (width, height) = (x_range.end() - x_range.start(), y_range.end() - y_range.start());
     if let Form::Bars(bar_width) = series.form {

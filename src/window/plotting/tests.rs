@@ -179,7 +179,7 @@ fn figures_of_a_training_are_the_same_on_screen_and_in_print() {
     let decoupled_mm = run.decouple_test();
     let pairs_mm = value_pairs(run.test(), &decoupled_mm, None);
     let line = RegressionLine::of(pairs_mm.iter().copied());
-    same("histogram", histogram_figure(&pairs_mm, None, Decoded::Nodes));
+    same("histogram", histogram_figure(&pairs_mm, Decoded::Nodes));
     let regression = same(
         "regression",
         regression_figure((pairs_mm.len(), &|pair| pairs_mm[pair]), &line, Decoded::Nodes),

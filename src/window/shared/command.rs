@@ -4,10 +4,9 @@ use decoupler_files::figure::SequentialMap;
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
 use super::ViewKind;
-use crate::window::test_view::HeightScale;
 
 /// Something that the user can do by a key, or by picking it from the list of all commands.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
     // Of the Train view.
     Train,
@@ -16,6 +15,7 @@ pub enum Command {
     ResumeTraining,
     StopTraining,
     OpenFiles,
+    DecodeFile,
     PressMiddle,
     NextSample,
     PreviousSample,
@@ -39,10 +39,10 @@ pub enum Command {
     Dark,
     Light,
     Colours(SequentialMap),
-    Scale(&'static str, HeightScale, Option<f64>),
     Larger,
     Smaller,
     UsualSize,
+    Form,
     Search,
     Keys,
     Glossary,
@@ -81,6 +81,11 @@ impl Command {
             Self::ResumeTraining => ("Resume training", ctrl(Key::P), ""),
             Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
             Self::OpenFiles => ("Open files", None, "A recording, recipe, network or checkpoint."),
+            Self::DecodeFile => (
+                "Decode file",
+                None,
+                "All rows of another file, with the network, to CSV.",
+            ),
             Self::PressMiddle => ("Press the middle of the surface", None, "Touch the sensor."),
             Self::NextSample => ("Next test sample", plain(Key::PageDown), ""),
             Self::PreviousSample => ("Previous test sample", plain(Key::PageUp), ""),
@@ -106,10 +111,14 @@ impl Command {
             Self::Dark => ("Dark theme", None, ""),
             Self::Light => ("Light theme", None, ""),
             Self::Colours(map) => (map.name(), None, map.meaning()),
-            Self::Scale(name, ..) => (*name, None, "Colours of the displayed heights or errors."),
             Self::Larger => ("Larger interface", ctrl(Key::Plus), "Zoom in."),
             Self::Smaller => ("Smaller interface", ctrl(Key::Minus), "Zoom out."),
             Self::UsualSize => ("Reset the interface size", ctrl(Key::Num0), "Zoom to 100 %."),
+            Self::Form => (
+                "Show or hide the settings",
+                None,
+                "In a narrow window they are hidden at first.",
+            ),
             Self::Search => ("Search actions", ctrl(Key::K), ""),
             Self::Keys => ("Keys", plain(Key::Questionmark), "Help: every shortcut."),
             Self::Glossary => ("Glossary", None, "Help: every term."),
@@ -140,12 +149,14 @@ impl About {
 }
 
 /// A command that is listed now.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Offer {
     /// The command.
     pub command: Command,
     /// False if it is not available now.
     pub is_possible: bool,
+    /// The view that must be shown first, if it is another one.
+    pub of: Option<ViewKind>,
 }
 
 /// The commands of this frame. The caller that offers a command carries it out when [`Self::offer`] returns true: its keys were
@@ -181,7 +192,12 @@ impl<'a> Offers<'a> {
         };
         let keys = command.about().keys.filter(may_hear);
         let is_pressed = keys.is_some_and(|keys| self.ctx.input_mut(|input| input.consume_shortcut(&keys)));
-        self.list.push(Offer { command, is_possible });
+        let of = None;
+        self.list.push(Offer {
+            command,
+            is_possible,
+            of,
+        });
         is_possible && (is_picked || is_pressed)
     }
 

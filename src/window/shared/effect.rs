@@ -3,7 +3,7 @@ use std::{path::PathBuf, sync::Arc};
 use decoupler_core::{evaluation::RunSettings, training::TrainerState};
 use decoupler_files::import::{Plan, Setup};
 
-use super::{Exporting, FileTask, Look, RunsRequest, SourceKind, ToCopy};
+use super::{Exporting, FileTask, Look, RunsRequest, SourceKind, ToCopy, ViewKind};
 
 /// Request of a view to the window, which applies all of them in one place once everything is drawn.
 #[derive(Clone, Debug)]
@@ -18,8 +18,8 @@ pub enum Effect {
     ChooseSource(SourceKind),
     /// Use the setup of another run for the next training.
     TakeSetup(Box<Setup>),
-    /// Show the Train view.
-    ShowTraining,
+    /// Show this view.
+    Show(ViewKind),
     /// Show the run of the list with this number in the Train view, with its settings.
     OpenRun(u64),
     /// Begin training.
@@ -34,6 +34,8 @@ pub enum Effect {
     Resume,
     /// Stop it.
     Stop,
+    /// Answer with ridge regression in place of the network of the ended training.
+    UseRidge,
     /// Continue from the current weights with the method and the epochs of the settings.
     Continue,
     /// Set the look of all surfaces.

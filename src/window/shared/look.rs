@@ -8,13 +8,16 @@ use decoupler_files::{
         surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
     },
 };
-use eframe::egui::{Align, Button, ComboBox, CursorIcon, Layout, Popup, Rect, Sense, Ui, UiBuilder, vec2};
+use eframe::egui::{
+    Align, Button, ComboBox, CursorIcon, Label, Layout, Popup, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, Vec2,
+    vec2,
+};
 
 use super::Effect;
 use crate::window::{
     surface_view::{SurfaceView, SurfaceViewResponse, colour_bar_ui},
     test_view::HeightScale,
-    theme::{rgb, space},
+    theme::{rgb, semibold, space, type_size},
     widgets::{card_ui, dim_ui, section_heading_ui, segmented_ui},
 };
 
@@ -80,6 +83,27 @@ pub fn view_mode_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
     effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
 }
 
+/// Divides the middle of a view: surfaces above, a chart below at the left, and figures at its right. In a small window it
+/// scrolls.
+pub fn surfaces_above_ui(ui: &mut Ui, contents_ui: impl FnOnce(&mut Ui, [Rect; 3])) {
+    /// Size below which it scrolls.
+    const MIN_SIZE: Vec2 = vec2(space(160), space(120));
+    let (gap, size) = (space(2), ui.available_size().max(MIN_SIZE));
+    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+        let (whole, _) = ui.allocate_exact_size(size, Sense::hover());
+        let lower_height = (0.43 * whole.height()).clamp(space(56), space(100));
+        let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+        let figures_width = (0.42 * whole.width()).clamp(space(80), space(120));
+        let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
+        let places = [
+            upper.with_max_y(upper.max.y - gap),
+            left.with_max_x(left.max.x - gap),
+            right,
+        ];
+        contents_ui(ui, places);
+    });
+}
+
 /// Cards of the same width side by side in `rect`, with the colour scales of `figure` at the right of the last one;
 /// `contents_ui` receives the number of the card.
 pub fn surface_cards_ui(
@@ -105,6 +129,20 @@ pub fn surface_cards_ui(
         let slot = Rect::from_x_y_ranges(scales.x_range(), top..=top + part).shrink2(vec2(0.0, space(4)));
         colour_scale_ui(ui, slot, scale, &note, look, effects);
     }
+}
+
+/// The title of a card, as far as the options at its right leave room for it.
+pub fn card_head_ui(ui: &mut Ui, title: &str, options_ui: impl FnOnce(&mut Ui)) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            options_ui(ui);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let title = RichText::new(title).font(semibold(type_size().title));
+                ui.add(Label::new(title).truncate());
+            });
+        });
+    });
 }
 
 /// Shows a surface, turns all surfaces as it is turned, and marks the node under the pointer on its neighbours too.

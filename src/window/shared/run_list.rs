@@ -186,9 +186,7 @@ impl RunList {
     pub fn newest(&self) -> Option<LoadedRun<'_>> {
         self.workspace.runs.last().and_then(LoadedRun::of)
     }
-}
 
-impl RunList {
     /// Takes the list from the thread; returns a notice for the user, if any.
     pub fn take_events(&mut self, worker: &RunsWorker) -> Option<Notice> {
         let mut notice = None;

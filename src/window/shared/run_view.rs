@@ -1,20 +1,26 @@
 use std::time::Duration;
 
 use decoupler_core::{evaluation::TestErrors, text::capitalised, training::StopReason};
-use decoupler_files::export::{format_duration, format_number, format_percent};
+use decoupler_files::export::{format_duration, format_percent};
 use eframe::egui::{Ui, WidgetInfo, accesskit::Role};
 
 use super::{Command, Effect, Phase, RunView, Shared, SourceKind, Status, Tone};
-use crate::window::{
-    theme::space,
-    widgets::{ghost_button, primary_button},
-};
+use crate::window::widgets::{ghost_button, primary_button};
 
-/// The buttons that run a training, from right to left.
+/// The buttons that run a training.
 pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     let phase = shared.phase;
     // In a narrow window the buttons show only their symbols.
-    let is_short = ui.available_width() < space(120);
+    let is_short = ui.ctx().content_rect().width() < 1100.0;
+    let longer = Command::TrainLonger.about();
+    if shared.can_continue() && ui.add(ghost_button(&longer.name)).on_hover_text(longer.hint).clicked() {
+        effects.push(Effect::Continue);
+    }
+    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
+    let hint = Command::Train.about().tooltip(ui.ctx());
+    if train.on_hover_text(hint).clicked() {
+        effects.push(Effect::Train);
+    }
     let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, command: Command, effect: Effect| {
         let shown = if is_short {
             text.split(' ').next().unwrap_or(text)
@@ -27,22 +33,13 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
             effects.push(effect);
         }
     };
-    button_ui(ui, "■ Stop", phase.is_busy(), Command::StopTraining, Effect::Stop);
     let (text, command, effect) = match phase {
         Phase::Paused => ("▶ Resume", Command::ResumeTraining, Effect::Resume),
         _ => ("⏸ Pause", Command::PauseTraining, Effect::Pause),
     };
     let can_pause = matches!(phase, Phase::Training | Phase::Paused);
     button_ui(ui, text, can_pause, command, effect);
-    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
-    let hint = Command::Train.about().tooltip(ui.ctx());
-    if train.on_hover_text(hint).clicked() {
-        effects.push(Effect::Train);
-    }
-    let longer = Command::TrainLonger.about();
-    if shared.can_continue() && ui.add(ghost_button(&longer.name)).on_hover_text(longer.hint).clicked() {
-        effects.push(Effect::Continue);
-    }
+    button_ui(ui, "■ Stop", phase.is_busy(), Command::StopTraining, Effect::Stop);
 }
 
 /// Returns the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of
@@ -70,7 +67,12 @@ pub fn training_status(shared: &Shared) -> Status {
 /// Returns the phase as text.
 fn phase_in_words(shared: &Shared) -> Status {
     let is_recording = shared.source == SourceKind::Recording;
-    let (tone, text) = match shared.phase {
+    let phase = match shared.phase {
+        // A result that is not shown any more is no state of what is.
+        Phase::Ended(_) if shared.shown_run().is_none() => Phase::Idle,
+        phase => phase,
+    };
+    let (tone, text) = match phase {
         Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
         Phase::Idle => (Tone::Calm, "Ready: press Train"),
         Phase::Preparing if is_recording => {
@@ -98,7 +100,7 @@ fn phase_in_words(shared: &Shared) -> Status {
 }
 
 fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
-    let (Some(latest), Some(result)) = (run.latest(), &run.result) else {
+    let Some(result) = &run.result else {
         return Vec::new();
     };
     let (epochs, epochs_run) = (run.settings().training.stopping.epochs, result.epochs_run);
@@ -108,20 +110,7 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
             TestErrors::Nodes(_) => format!("z error {}", format_percent(result.errors.percent())),
             TestErrors::Targets(_) => format!("error {} of range", format_percent(result.errors.percent())),
         },
-        format!("mse {}", format_number(latest.training_mse)),
-        format!(
-            "{} {}",
-            run.settings().training.method.parameter_name(),
-            format_number(latest.parameter)
-        ),
     ];
-    if run.settings().starts > 1 && phase.is_busy() {
-        parts.push(format!(
-            "{} of {} restarts ended",
-            result.starts_ended,
-            run.settings().starts
-        ));
-    }
     if let Some(time) = result.wall_time
         && epochs_run > 0
     {

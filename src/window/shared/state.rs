@@ -153,6 +153,16 @@ impl Shared {
         }
     }
 
+    /// Returns true if the displayed view has a column on the right in a window of this width in points, which leaves the
+    /// middle enough room: two surfaces, or the values of a recording over time.
+    pub fn has_report(&self, window_width: f32) -> bool {
+        let min_width = match self.source {
+            SourceKind::Array => 1700.0,
+            SourceKind::Recording => 1400.0,
+        };
+        self.shown == ViewKind::Train && window_width >= min_width
+    }
+
     /// Settings of the next training.
     pub fn settings(&self) -> RunSettings {
         match self.source {
@@ -215,13 +225,15 @@ impl Shared {
         self.test()?.skin.as_ref()
     }
 
-    /// Returns the current training; none if it has the other source, or the draft has another test set by now.
+    /// Returns the current training; none if it has another source, or the draft has another test set by now.
     pub fn shown_run(&self) -> Option<&RunView> {
         let run = self.run.as_ref()?;
-        let is_recording = run.setup.plan().is_some();
-        let is_shown = match self.source {
-            SourceKind::Array => !is_recording && self.preview.is_none(),
-            SourceKind::Recording => is_recording,
+        let is_shown = match (self.source, run.setup.plan(), &self.recording.plan) {
+            (SourceKind::Array, None, _) => self.preview.is_none(),
+            // Another recording does not inherit its errors.
+            (SourceKind::Recording, Some(plan), Ok(open)) => plan.import.data == open.import.data,
+            (SourceKind::Recording, Some(_), Err(_)) => true,
+            _ => false,
         };
         is_shown.then_some(run)
     }
@@ -250,9 +262,9 @@ impl Shared {
         may_continue && asked == run.asked
     }
 
-    /// Returns true if the settings or the plan have changed since `run` began or was continued.
-    pub fn has_changed_since(&self, run: &RunView) -> bool {
-        self.asked().is_ok_and(|asked| asked != run.asked)
+    /// Returns true if the settings or the plan have changed since `run` began or was continued, and it has ended.
+    pub fn is_old(&self, run: &RunView) -> bool {
+        run.stop_reason.is_some() && self.asked().is_ok_and(|asked| asked != run.asked)
     }
 
     /// The current result.

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use eframe::egui::{Align, Key, Layout, RichText, Sense, Ui, Vec2};
+use eframe::egui::{Align, Key, Label, Layout, RichText, Sense, TextStyle, TextWrapMode, Ui, Vec2, WidgetText};
 
 use super::{Effect, FileInUse, Offers, Shared, Shown};
 use crate::window::{
@@ -30,13 +30,13 @@ pub trait View: Debug {
         Vec::new()
     }
 
-    /// Shows its tools at the right of the top bar, from right to left.
+    /// Shows its tools at the right of the top bar.
     fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Shows its column on the left.
+    /// Shows its column on the left; not called while that is hidden in a narrow window.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
-    /// Shows its column on the right, where [`ViewKind::has_report`] has one.
+    /// Shows its column on the right, where [`Shared::has_report`] is true.
     fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Shows its middle. Returns the status line at the bottom, or `None` for that of the training.
@@ -79,15 +79,7 @@ impl ViewKind {
         const KEYS: [Key; 5] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5];
         KEYS[self as usize]
     }
-
-    /// Returns true if it has a column on the right in a window of this width in points.
-    pub fn has_report(self, window_width: f32) -> bool {
-        self == Self::Train && window_width >= MIN_WIDTH_FOR_REPORT
-    }
 }
-
-/// Width of a window, in points, from which a column on the right leaves the middle enough room.
-pub const MIN_WIDTH_FOR_REPORT: f32 = 1400.0;
 
 /// Status of a view, shown in the line at the bottom.
 #[derive(Clone, Debug, PartialEq)]
@@ -134,9 +126,16 @@ impl Status {
             ui.spacing_mut().item_spacing.x = space(4);
             let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
             ui.painter().circle_filled(dot.center(), 4.0, colour);
-            ui.label(RichText::new(&self.text).size(type_size().note));
+            let text = |text: &str| RichText::new(text).size(type_size().note);
+            ui.add(Label::new(text(&self.text)).truncate());
+            let for_progress = self.progress.map_or(0.0, |_| space(44));
             for note in &self.notes {
-                ui.label(RichText::new(note).size(type_size().note).color(palette.dim));
+                let note = text(note).color(palette.dim);
+                let note = WidgetText::from(note).into_galley(ui, Some(TextWrapMode::Extend), 0.0, TextStyle::Body);
+                // What does not fit is left out, not cut.
+                if note.size().x < ui.available_width() - for_progress {
+                    ui.label(note);
+                }
             }
             if let Some((name, share)) = self.progress {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

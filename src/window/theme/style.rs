@@ -49,17 +49,17 @@ fn style(is_dark: bool) -> Style {
     spacing.item_spacing = vec2(space(2), space(1));
     spacing.button_padding = vec2(space(2), space(1));
     spacing.interact_size = vec2(space(10), space(6));
-    spacing.window_margin = Margin::same(16);
     spacing.menu_margin = Margin::same(4);
     spacing.slider_rail_height = space(1);
     spacing.icon_width = space(4);
     spacing.icon_width_inner = space(2);
     spacing.icon_spacing = space(2);
-    spacing.indent = space(4);
     spacing.tooltip_width = 320.0;
     spacing.scroll = ScrollStyle {
         bar_width: space(2),
         floating_width: 3.0,
+        // One sees that there is more, also before the pointer is there.
+        dormant_handle_opacity: 0.3,
         ..ScrollStyle::floating()
     };
     style.interaction.tooltip_delay = 0.3;
@@ -92,13 +92,8 @@ fn visuals(is_dark: bool) -> Visuals {
         stroke: Stroke::new(1.0, palette.accent),
     };
     visuals.weak_text_color = Some(palette.dim);
-    visuals.hyperlink_color = palette.accent;
-    visuals.warn_fg_color = palette.warning;
-    visuals.error_fg_color = palette.bad;
-    visuals.faint_bg_color = palette.raised;
     visuals.extreme_bg_color = palette.background;
     visuals.text_edit_bg_color = Some(palette.raised);
-    visuals.code_bg_color = palette.raised;
     visuals.panel_fill = palette.panel;
     visuals.window_fill = palette.panel;
     visuals.window_stroke = hairline;
@@ -109,7 +104,6 @@ fn visuals(is_dark: bool) -> Visuals {
     visuals.text_cursor.stroke = Stroke::new(1.5, palette.accent);
     visuals.slider_trailing_fill = true;
     visuals.handle_shape = HandleShape::Circle;
-    visuals.indent_has_left_vline = false;
     visuals.disabled_alpha = 0.4;
     visuals
 }

@@ -2,7 +2,7 @@ use std::{
     cell::Cell,
     path::PathBuf,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc,
         atomic::{AtomicU64, Ordering},
         mpsc::{Sender, channel},
     },
@@ -10,7 +10,7 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{Coverage, Run, RunError, RunSettings, StartRecord, TestErrors},
+    evaluation::{Coverage, Intervals, Run, RunError, RunSettings, StartRecord, TestErrors},
     live::{DriftReference, LiveError},
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
@@ -28,6 +28,7 @@ use super::{
 use crate::window::{
     job::{Background, JobError, Wake},
     test_view::TestCharts,
+    timeline::Timeline,
 };
 
 /// Request from the window to the worker.
@@ -42,6 +43,8 @@ pub enum Request {
     Resume,
     /// End the training and keep its network.
     Stop,
+    /// Answer with ridge regression in place of the network of the ended training.
+    UseRidge,
     /// Inspect this training, unless another one has replaced it.
     Inspect(RunId, Inspection),
     /// Keep checkpoints of running trainings in this folder from now on, saved at this interval.
@@ -119,6 +122,8 @@ pub struct TrainedRun {
     pub run: Run,
     /// Origin of recorded samples; `None` for a simulated array.
     pub recorded: Option<Recorded>,
+    /// Places of the test samples of a recording on an axis of time.
+    pub timeline: Option<Arc<Timeline>>,
     /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
     pub drift: Result<DriftReference, LiveError>,
     /// Remarks on the samples of a recording.
@@ -189,14 +194,14 @@ pub struct RunResult {
     pub network_alone: Option<TestErrors>,
     /// Coverage of the intervals on the test set, if they were calibrated.
     pub coverage: Vec<Option<Coverage>>,
+    /// Intervals of the decoded values, if they were calibrated.
+    pub intervals: Option<Intervals>,
     /// Epoch of the network.
     pub best_epoch: usize,
     /// Problem of the training, when it has ended.
     pub defect: Option<String>,
     /// Number of epochs of the start that is furthest ahead.
     pub epochs_run: usize,
-    /// Number of starts that have ended.
-    pub starts_ended: usize,
     /// Wall-clock time of the training, with all starts in parallel, if known.
     pub wall_time: Option<Duration>,
     /// Decoding time of one snapshot, measured when the training pauses or ends.
@@ -241,8 +246,7 @@ pub fn furthest_epoch(run: &Run) -> usize {
 pub struct Worker {
     // Dropped first: a thread that finds no one to send requests must know that it is cancelled.
     job: Background<Event>,
-    /// Shared with the thread that waits for signals.
-    requests: Arc<Mutex<Sender<Request>>>,
+    requests: Sender<Request>,
     keeping: Keeping,
     /// The training that is being prepared.
     awaited: Cell<Option<RunId>>,
@@ -262,7 +266,7 @@ impl Worker {
             |ended| Event::Died(ended.err()),
         );
         Self {
-            requests: Arc::new(Mutex::new(requests)),
+            requests,
             job,
             keeping,
             awaited: Cell::default(),
@@ -277,14 +281,7 @@ impl Worker {
 
     /// Starts another thread after this one has died.
     pub fn restart(&mut self, wake: Wake) {
-        let new = Self::start(wake);
-        let requests = Arc::clone(&self.requests);
-        *self.requests() = new.requests().clone();
-        *self = Self { requests, ..new };
-    }
-
-    fn requests(&self) -> MutexGuard<'_, Sender<Request>> {
-        self.requests.lock().unwrap_or_else(PoisonError::into_inner)
+        *self = Self::start(wake);
     }
 
     /// Removes the checkpoint of the running training, which the user leaves unfinished, and keeps none from now on.
@@ -292,19 +289,13 @@ impl Worker {
         self.keeping.forget();
     }
 
-    /// Returns a function that saves the running training and waits until it is saved.
-    pub fn saver(&self) -> impl Fn() + Send + use<> {
+    /// Saves the running training and waits until it is saved.
+    pub fn save(&self) {
         /// An epoch may take longer; its training is then as old as the last checkpoint.
         const LONGEST_SAVE: Duration = Duration::from_secs(5);
-        let requests = Arc::clone(&self.requests);
-        move || {
-            let (done, saved) = channel();
-            let requests = requests.lock().unwrap_or_else(PoisonError::into_inner);
-            // If the thread has died, there is nothing to save.
-            let _ = requests.send(Request::Save(done));
-            drop(requests);
-            let _ = saved.recv_timeout(LONGEST_SAVE);
-        }
+        let (done, saved) = channel();
+        self.ask(Request::Save(done));
+        let _ = saved.recv_timeout(LONGEST_SAVE);
     }
 
     /// Begins a training. Others that are being prepared are cancelled.
@@ -322,7 +313,7 @@ impl Worker {
             self.newest.store(RunId::new().0, Ordering::Relaxed);
         }
         // The receiver is dropped only if the worker died.
-        let _ = self.requests().send(request);
+        let _ = self.requests.send(request);
     }
 
     /// Returns true while a training is being prepared and not cancelled.
@@ -355,7 +346,7 @@ mod tests {
         /// Returns a worker whose thread panics; `wake` is called afterwards.
         pub fn dying(wake: Wake) -> Self {
             let mut dead = Self::start(wake);
-            *dead.requests() = channel().0;
+            dead.requests = channel().0;
             dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
             dead
         }

@@ -1,27 +1,31 @@
-use std::{ops::Deref, sync::Arc, time::Duration};
+use std::{ops::Deref, path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
     dataset::{Dataset, SplitBy},
     evaluation::{
-        Baselines, ErrorTable, PublishedErrors, Run, RunSettings, Scores, StartRecord, auto::AutoRecord, frame_us,
+        Baselines, ErrorTable, PublishedErrors, RunSettings, Scores, StartRecord, auto::AutoRecord, frame_us,
         recorded::Determination,
     },
+    job::Job,
     problem::Problem,
     training::{EpochRecord, Stage, StopReason},
 };
 use decoupler_files::{
     export::{NetworkFile, describe_coverage, describe_determinacy, describe_worse_than_ridge},
     figure::EpochOutline,
-    import::{Plan, Recorded, Setup},
+    import::{Plan, Setup},
 };
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    message::{Progress, RunId, RunResult, append_epochs},
+    message::{Progress, RunId, RunResult, TrainedRun, append_epochs},
     past_networks::PastNetworks,
 };
-use crate::window::test_view::{TestView, TestViewError};
+use crate::window::{
+    test_view::{TestView, TestViewError},
+    timeline::Timeline,
+};
 
 /// Plan of a recording, which the settings, the training and the file of the window share: comparing it costs nothing.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -107,17 +111,14 @@ impl RunView {
     ///
     /// # Errors
     /// If its test set cannot be drawn.
-    pub fn begun(
-        id: RunId,
-        run: &Run,
-        recorded: Option<&Recorded>,
-        asked: Option<Setup>,
-    ) -> Result<Self, TestViewError> {
+    pub fn begun(id: RunId, trained: &TrainedRun, asked: Option<Setup>) -> Result<Self, TestViewError> {
+        let (run, recorded) = (&trained.run, trained.recorded.as_ref());
         let plan = recorded.map(|recorded| recorded.plan.clone());
         let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
         let setup = Setup::of(*run.settings(), plan).expect("a recorded run has its plan");
         let baselines = run.baselines().cloned();
-        let test = TestView::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)?;
+        let mut test = TestView::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)?;
+        test.timeline = trained.timeline.clone().unwrap_or(test.timeline);
         let baselines = baselines.expect("the baselines of a whole run are measured");
         Ok(Self {
             id,
@@ -133,11 +134,21 @@ impl RunView {
     /// # Errors
     /// If it cannot be drawn or read.
     pub fn kept(name: String, file: Arc<NetworkFile>) -> Result<Self, String> {
-        let set = file.test_set().map_err(|error| error.to_string())?;
+        let (set, timeline) = match &file.recorded {
+            None => (file.test_set().map_err(|error| error.to_string())?, None),
+            Some(recorded) => {
+                let sets = file.setup().sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ());
+                let sets = sets.and_then(|sets| sets.check_saved(Some(recorded)).map(|()| sets));
+                let sets = sets.map_err(|error| error.to_string())?;
+                let timeline = |of| Arc::new(Timeline::of(of, file.settings.seed));
+                (sets.sets.test, sets.recordings.as_ref().map(timeline))
+            }
+        };
         let plan = file.recorded.as_ref().map(|recorded| &recorded.plan);
         let order = plan.map_or(SplitBy::Time, Plan::test_order);
         let test = TestView::new(Arc::clone(&set), Arc::new(file.problem.clone()), order);
-        let test = test.map_err(|error| error.to_string())?;
+        let mut test = test.map_err(|error| error.to_string())?;
+        test.timeline = timeline.unwrap_or(test.timeline);
         let answers = file.decoder().answers_to(&set);
         let mut outline = EpochOutline::default();
         outline.extend(&file.training.history);
@@ -151,10 +162,10 @@ impl RunView {
             errors: scores.network.clone(),
             network_alone: scores.network_alone.clone(),
             coverage: scores.coverage.clone(),
+            intervals: file.intervals.clone(),
             best_epoch: training.best_epoch,
             defect: None,
             epochs_run: training.epochs,
-            starts_ended: training.starts.len(),
             wall_time: None,
             frame_time: frame_time.map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
             is_idle: true,

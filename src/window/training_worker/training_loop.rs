@@ -36,6 +36,7 @@ use super::{
 use crate::window::{
     job::Report,
     test_view::{TestView, TestViewError},
+    timeline::Timeline,
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
@@ -121,7 +122,11 @@ impl<'a> TrainingLoop<'a> {
                 let calibrated = current.calibrated(&|| true);
                 self.end(calibrated);
             }
-            (Request::Pause | Request::Resume | Request::Stop, _) => {}
+            (Request::UseRidge, Some(current)) if current.stage == Stage::Done => {
+                let calibrated = current.trained.use_ridge();
+                self.end(Some(calibrated));
+            }
+            (Request::Pause | Request::Resume | Request::Stop | Request::UseRidge, _) => {}
             (Request::Inspect(id, inspection), Some(current)) if current.id == id => {
                 inspection(Ok(&current.trained));
             }
@@ -242,8 +247,7 @@ impl<'a> TrainingLoop<'a> {
                 restored(left.path(), &job, &mut on_reading)?
             }
         };
-        let began =
-            RunView::begun(id, &trained.run, trained.recorded.as_ref(), asked).map_err(|error| error.to_string())?;
+        let began = RunView::begun(id, &trained, asked).map_err(|error| error.to_string())?;
         job.check().map_err(|error| error.to_string())?;
         Ok((trained, began))
     }
@@ -391,7 +395,6 @@ impl Training {
         let frame_time = is_idle
             .then(|| frame_us(&mut networks.decoder(), run.test()).ok())
             .flatten();
-        let ended = run.trainers().iter().filter(|start| start.stop_reason().is_some());
         let progress = Progress {
             epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
             stages: trainer.stages().to_vec(),
@@ -408,10 +411,10 @@ impl Training {
                 errors,
                 network_alone,
                 coverage: run.coverage().to_vec(),
+                intervals: run.intervals().cloned(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),
-                starts_ended: ended.count(),
                 wall_time: run.wall_time(),
                 frame_time: frame_time.map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
                 is_idle,
@@ -470,12 +473,14 @@ fn restored(path: &Path, job: &Job<'_>, on_reading: &mut dyn FnMut(Reading)) -> 
 
 impl TrainedRun {
     fn new(run: Run, sets: &SetupSets) -> Self {
+        let recordings = sets.recordings.as_ref();
         Self {
-            run,
             recorded: sets.recorded().cloned(),
+            timeline: recordings.map(|recordings| Arc::new(Timeline::of(recordings, run.settings().seed))),
             drift: sets.drift_reference(),
             of_samples: describe_samples(sets),
             calibration: Calibration::of(sets),
+            run,
         }
     }
 
@@ -486,6 +491,18 @@ impl TrainedRun {
             drift: self.drift.clone(),
             ..file
         })
+    }
+
+    /// Answers with ridge regression in place of the network from now on; returns its intervals, or why there are none.
+    fn use_ridge(&mut self) -> Result<Intervals, String> {
+        let calibration = self.calibration.as_ref().ok_or(LOST)?;
+        let (combined, intervals) = calibration.ridge(&self.run).map_err(|error| error.to_string())?;
+        if let Some(recorded) = &mut self.recorded {
+            recorded.combined = Some(combined.clone());
+            recorded.chosen_intervals = intervals.clone().ok();
+        }
+        self.run.set_combined(Some(combined));
+        intervals.map_err(|reason| format!("no 90 % intervals: {reason}"))
     }
 
     /// Returns the current state, to be resumed later.

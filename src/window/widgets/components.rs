@@ -1,8 +1,8 @@
 //! Components that egui lacks, each accessible by its label, and the reason why text typed into a field was refused.
 
 use eframe::egui::{
-    Align, Button, CollapsingHeader, Color32, DragValue, FontId, Frame, Id, Key, Label, Layout, Margin, ProgressBar,
-    Rect, Response, RichText, ScrollArea, Stroke, StrokeKind, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
+    Align, Button, CollapsingHeader, Color32, DragValue, Frame, Id, Key, Label, Layout, Margin, ProgressBar, Rect,
+    Response, RichText, ScrollArea, Stroke, StrokeKind, TextStyle, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
     accesskit::{Invalid, Role},
     vec2,
 };
@@ -123,7 +123,15 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
 ) -> Option<T> {
     let palette = Theme::of(ui).palette;
     let padding = 2.0;
-    let width = (ui.available_width() - 2.0 * padding) / options.len().max(1) as f32;
+    // Texts of different lengths share what they leave of the width.
+    let font = TextStyle::Button.resolve(ui.style());
+    let text_width = |text: &str| {
+        let galley = ui.painter().layout_no_wrap(text.to_owned(), font.clone(), palette.text);
+        galley.size().x + 6.0
+    };
+    let least: f32 = options.iter().map(|(_, text, _)| text_width(text)).sum();
+    let spare = (ui.available_width() - 2.0 * padding - least) / options.len().max(1) as f32;
+    let widths = Vec::from_iter(reading_order(ui, options).iter().map(|(_, text, _)| text_width(text)));
     let mut picked = None;
     let group = Frame::new()
         .fill(palette.raised)
@@ -132,13 +140,16 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
     let response = group
         .show(ui, |ui| {
             ui.spacing_mut().item_spacing.x = 0.0;
+            if fill_width {
+                ui.spacing_mut().button_padding.x = 3.0;
+            }
             // Options are flat until the pointer is over them.
             ui.visuals_mut().widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
             ui.visuals_mut().widgets.inactive.fg_stroke.color = palette.dim;
             ui.horizontal(|ui| {
-                for &(option, text, meaning) in reading_order(ui, options) {
+                for (&(option, text, meaning), width) in reading_order(ui, options).into_iter().zip(widths) {
                     let is_selected = option == selected;
-                    let min_width = if fill_width { width.floor() } else { 0.0 };
+                    let min_width = if fill_width { (width + spare).floor() } else { 0.0 };
                     let button = Button::selectable(is_selected, text)
                         .frame_when_inactive(true)
                         .corner_radius(radius() - 1)
@@ -272,16 +283,27 @@ pub fn fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str) {
 /// As [`fact_ui`], in a given colour.
 pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, colour: Color32) {
     let dim = Theme::of(ui).palette.dim;
-    ui.horizontal(|ui| {
-        let text = |text: &str| RichText::new(text).size(type_size().note);
-        ui.label(text(name).color(dim)).on_hover_text(meaning);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let response = ui.add(Label::new(text(value).color(colour)).truncate());
-            let label = format!("{name}: {value}");
-            response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
-            response.on_hover_text(meaning);
+    let text = |text: &str| RichText::new(text).size(type_size().note);
+    let name_ui = |ui: &mut Ui| {
+        let label = ui.label(text(name).color(dim)).on_hover_text(meaning);
+        // The value is read with its name.
+        ui.ctx().accesskit_node_builder(label.id, |node| node.set_hidden());
+    };
+    let value_ui = |ui: &mut Ui| {
+        let response = ui.add(Label::new(text(value).color(colour)).wrap());
+        let label = format!("{name}: {value}");
+        response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
+        response.on_hover_text(meaning);
+    };
+    if ui.available_width() < space(56) {
+        name_ui(ui);
+        value_ui(ui);
+    } else {
+        ui.horizontal(|ui| {
+            name_ui(ui);
+            ui.with_layout(Layout::right_to_left(Align::Center), value_ui);
         });
-    });
+    }
 }
 
 /// Draws a focus ring around a widget that does not show the focus otherwise.
@@ -318,9 +340,9 @@ pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mu
         })
         .inner;
     focus_ring_ui(ui, &header);
-    let text_width =
-        ui.painter()
-            .layout_no_wrap(name.to_owned(), eframe::egui::TextStyle::Body.resolve(ui.style()), dim);
+    let text_width = ui
+        .painter()
+        .layout_no_wrap(name.to_owned(), TextStyle::Body.resolve(ui.style()), dim);
     let mut place = header.rect;
     place.min.x += space(7) + text_width.size().x + space(2);
     place.max.x -= space(1);
@@ -396,28 +418,26 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
             picked = to;
         }
     };
-    // The layout is right to left: next, number, previous.
-    let next = Some(shown + 1).filter(|next| *next < snapshots);
-    arrow_ui(ui, "›", next, "Next", "Page down");
+    let (title, window) = (format!("Test {what}"), ui.ctx().content_rect().width());
+    let dim = Theme::of(ui).palette.dim;
+    let label = (window >= 1200.0).then(|| ui.label(RichText::new(&title).color(dim)));
+    arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
     let mut number = shown + 1;
     let suffix = format!(" of {}", snapshots.max(1));
     let field = DragValue::new(&mut number).range(1..=snapshots.max(1)).suffix(suffix);
     let field = ui
         .add_enabled(snapshots > 0, field)
         .on_hover_text("Type a number, or drag.");
-    arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
-    if number != shown + 1 && snapshots > 0 {
-        picked = Some(number - 1);
-    }
-    let title = format!("Test {what}");
-    let dim = Theme::of(ui).palette.dim;
-    let font = FontId::proportional(type_size().body);
-    let width = ui.painter().layout_no_wrap(title.clone(), font, dim).size().x;
-    if ui.available_width() >= width {
-        let label = ui.label(RichText::new(&title).color(dim));
+    if let Some(label) = label {
         field.labelled_by(label.id);
     } else {
         ui.ctx().accesskit_node_builder(field.id, |node| node.set_label(title));
     }
-    picked
+    let next = Some(shown + 1).filter(|next| *next < snapshots);
+    arrow_ui(ui, "›", next, "Next", "Page down");
+    if number != shown + 1 && snapshots > 0 {
+        Some(number - 1)
+    } else {
+        picked
+    }
 }

@@ -71,13 +71,18 @@ pub fn percent_ui(
     let mut percent = in_percent(*share);
     let limits = usually(in_percent(usual), range_percent);
     if quantity_ui(ui, name, hint, &mut percent, limits, "%").changed() {
-        *share = to_twelve_digits(percent / 100.0);
+        *share = of_percent(percent);
     }
 }
 
 /// Returns a fraction of one in percent.
 pub fn in_percent(share: f64) -> f64 {
     to_twelve_digits(100.0 * share)
+}
+
+/// Returns a percentage as a fraction of one.
+pub fn of_percent(percent: f64) -> f64 {
+    to_twelve_digits(percent / 100.0)
 }
 
 /// Rounds to twelve digits: 100 · 0.07 would be shown as 7.000000000000001, and 0.7 % would differ from 0.007.

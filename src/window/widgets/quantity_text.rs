@@ -46,7 +46,8 @@ pub(super) fn parse(text: &str, unit: &str, range: &RangeInclusive<f64>, is_whol
     }
     let with_unit = |value: f64| {
         let space = if unit.is_empty() { "" } else { " " };
-        format!("{}{space}{unit}", input_text(value)).replace('-', "−")
+        let number = if is_whole { value.to_string() } else { input_text(value) };
+        format!("{number}{space}{unit}").replace('-', "−")
     };
     if value < *range.start() {
         return Err(format!(
@@ -192,7 +193,7 @@ mod tests {
             ("0.5 mm", "mm", false, "0.5 mm is too small: at least 1 mm."),
             ("1 m", "mm", false, "1000 mm is too large: at most 500 mm."),
             ("-4", "", true, "−4 is too small: at least 1."),
-            ("1e6", "", true, "1e6 is too large: at most 500."),
+            ("1e6", "", true, "1000000 is too large: at most 500."),
         ];
         for (typed, unit, is_whole, expected) in cases {
             let reason = parse(typed, unit, &(1.0..=500.0), is_whole).unwrap_err();

@@ -155,7 +155,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     }
     let error = match level.noise {
         Some(_) => "Z error (%)",
-        None => "mean absolute error (% of range)",
+        None => "MAE (% of range)",
     };
     let model_based = level.points.first().and_then(|point| point.model_based);
     let model_based = model_based.filter(|errors| !errors.is_rounding());

@@ -59,5 +59,5 @@ pub(crate) use recipe::{restored, stored};
 pub use sentinel::Sentinel;
 pub(crate) use setup::watch;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
-pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};
+pub use suggestion::{Meaning, is_group_name, suggested_plan, suggested_plan_in_order};
 pub use table::{Column, Fault, Faults, Table, Variable};

@@ -205,7 +205,7 @@ fn score_of_file(path: &Path) -> i32 {
 }
 
 /// Returns `true` if a column of this name looks like a group, such as `trial`, `Session_ID` or `press number`.
-pub(super) fn is_group_name(name: &str) -> bool {
+pub fn is_group_name(name: &str) -> bool {
     let name = name.trim().to_lowercase();
     let words = Vec::from_iter(name.split(|letter: char| !letter.is_alphanumeric()));
     is_one_of(words[0], GROUP_NAMES)

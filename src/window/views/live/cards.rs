@@ -4,30 +4,35 @@ use decoupler_core::{live::ZeroGains, text::counted};
 use decoupler_files::{
     export::{format_duration, format_number},
     figure::{
-        HeatMap,
+        HeatMap, TimeSeries,
         surface::{Surface, SurfaceFigure},
     },
-    live::{SourcePlan, Tally},
+    live::SourcePlan,
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo};
 
 use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
-    plotting::{cells_ui, titled_plots_ui},
-    shared::{Command, Effect, Look, Shared, surface_cards_ui, surface_ui, view_mode_ui},
+    plotting::{SeriesView, cells_ui},
+    shared::{Command, Effect, Look, Shared, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui},
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
-        card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
+        card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, invitation_ui, note_ui, scrolled_ui,
         section_heading_ui, segmented_ui, slider_ui,
     },
 };
 
-/// Shows the answers above, the readings or values and the figures below, and the replay bar at the bottom.
+/// Shows the surfaces, the readings or values, the figures, and the replay bar at the bottom.
 pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let whole = ui.available_rect_before_wrap();
     let Some(answer) = view.shown.answer.clone() else {
-        card_ui(ui, whole, |ui| invitation_ui(ui, view, shared, effects));
+        card_ui(ui, whole, |ui| {
+            let text = invitation(view, shared);
+            if invitation_ui(ui, &text, "Play the sample recording", view.running.is_none()) {
+                view.play_sample(shared);
+            }
+        });
         ui.allocate_rect(whole, Sense::hover());
         return;
     };
@@ -38,30 +43,54 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         card_ui(ui, bar, |ui| replay_bar_ui(ui, view, shared, effects));
         cards = rest.with_max_y(rest.bottom() - gap);
     }
-    let lower_height = (0.46 * cards.height()).clamp(space(60), space(100));
-    let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
-    let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
-    let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-    let mut upper = upper.with_max_y(upper.bottom() - gap);
-    let left = left.with_max_x(left.right() - gap);
-    if let Some(readings) = &answer.readings {
+    let below = |rect: Rect| {
+        let height = (0.46 * rect.height()).clamp(space(45), space(100));
+        let (upper, lower) = rect.split_top_bottom_at_y(rect.bottom() - height);
+        (upper.with_max_y(upper.bottom() - gap), lower)
+    };
+    let beside = |rect: Rect| {
+        let width = (0.42 * rect.width()).clamp(space(75), space(110));
+        let (left, right) = rect.split_left_right_at_x(rect.right() - width);
+        (left.with_max_x(left.right() - gap), right)
+    };
+    // In a narrow window, the readings are left out.
+    let is_narrow = cards.width() < space(130);
+    let series = answer.series();
+    let has_chart = series.is_some();
+    let (main, rest) = if has_chart && !is_narrow {
+        beside(cards)
+    } else {
+        below(cards)
+    };
+    let (surfaces, values, figures) = match has_chart {
+        true if answer.surfaces.is_empty() => (Rect::NOTHING, main, rest),
+        true => {
+            let (surfaces, chart) = below(main);
+            (surfaces, chart, rest)
+        }
+        false if is_narrow => (main, Rect::NOTHING, rest),
+        false => {
+            let (readings, figures) = beside(rest);
+            (main, readings, figures)
+        }
+    };
+    if !answer.surfaces.is_empty() {
+        surfaces_ui(ui, surfaces, view, shared.look, effects);
+    }
+    if let Some(series) = &series {
+        card_ui(ui, values, |ui| {
+            if series.targets.len() > SeriesView::tracks(ui) {
+                target_choice_ui(ui, "From target", "live target", series.targets, &mut view.series.first);
+            }
+            let name = |sample| format!("{} s", format_number(series.places[sample]));
+            view.series.show(ui, "Decoded values", series, None, name);
+        });
+    }
+    if let Some(readings) = answer.readings.as_ref().filter(|_| values.is_positive()) {
         let readings = readings.clone().coloured(shared.look.colours);
-        card_ui(ui, left, |ui| readings_ui(ui, &readings, &answer.faulty));
+        card_ui(ui, values, |ui| readings_ui(ui, &readings, &answer.faulty));
     }
-    if let Some(chart) = &answer.chart {
-        let (surface, beside) = upper.split_left_right_at_x(upper.center().x);
-        let place = if answer.surfaces.is_empty() { upper } else { beside };
-        let title = match answer.network.intervals {
-            Some(_) => "Decoded values with their 90 % intervals",
-            None => "Decoded values",
-        };
-        card_ui(ui, place, |ui| titled_plots_ui(ui, title, chart));
-        let values_ui = |ui: &mut Ui| values_ui(ui, &answer);
-        card_ui(ui, left, |ui| scrolled_ui(ui, "live targets", values_ui));
-        upper = surface;
-    }
-    surfaces_ui(ui, upper, view, shared.look, effects);
-    card_ui(ui, right, |ui| {
+    card_ui(ui, figures, |ui| {
         scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, &answer, shared, effects));
     });
     ui.allocate_rect(whole, Sense::hover());
@@ -149,26 +178,6 @@ pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look)
     .with_common_scales()
 }
 
-/// Shows what an empty view waits for, and the buttons that fill it.
-fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    ui.vertical_centered(|ui| {
-        ui.add_space((0.5 * ui.available_height() - space(15)).max(0.0));
-        ui.set_max_width(ui.available_width().min(space(105)));
-        ui.label(RichText::new(invitation(view, shared)).color(Theme::of(ui).palette.dim));
-        ui.add_space(space(4));
-        let can_train = view.network(shared).is_none() && !shared.phase.is_busy();
-        if can_train && ui.add(primary_button("Train a network now")).clicked() {
-            effects.extend([Effect::ShowTraining, Effect::Train]);
-        }
-        ui.add_space(space(2));
-        let hint = "Four seconds of a ball that wanders over a simulated array, with a network that decodes them.";
-        let sample = ui.add_enabled(view.running.is_none(), ghost_button("Play the sample recording"));
-        if sample.on_hover_text(hint).clicked() {
-            view.play_sample(shared);
-        }
-    });
-}
-
 /// Returns what an empty view waits for.
 fn invitation(view: &LiveView, shared: &Shared) -> String {
     if let Some(running) = &view.running {
@@ -177,10 +186,10 @@ fn invitation(view: &LiveView, shared: &Shared) -> String {
             None => format!("Waiting for the first frame from {}.", running.source_text()),
         };
     }
-    let Some((name, file)) = view.network(shared) else {
+    let Some((name, _)) = view.network(shared) else {
         return match shared.phase.is_busy() {
             true => "A network is being trained: it can be used here as soon as it is finished.".to_owned(),
-            false => "Live decoding needs a trained network. Training one takes seconds to minutes.".to_owned(),
+            false => "Live decoding needs a trained network. The sample recording comes with one.".to_owned(),
         };
     };
     match view.plan(shared).map(|plan| plan.source) {
@@ -189,8 +198,7 @@ fn invitation(view: &LiveView, shared: &Shared) -> String {
             "Start shows an indenter that wanders over a simulated array, decoded by the network '{name}'. To decode your own \
              readings, choose a replay, a serial port or a TCP address on the left."
         ),
-        Ok(_) if file.problem.sensor.is_some() => format!("The network '{name}' decodes frames as they arrive."),
-        Ok(_) => format!("The network '{name}' decodes samples as they arrive, by the names of their columns."),
+        Ok(_) => format!("Start decodes it with the network '{name}'."),
     }
 }
 
@@ -210,23 +218,21 @@ fn readings_ui(ui: &mut Ui, readings: &HeatMap, [rows, columns]: &[Vec<usize>; 2
     }
 }
 
-/// Shows the latest value of each target, with its uncertainty.
-fn values_ui(ui: &mut Ui, answer: &Answered) {
-    section_heading_ui(ui, "Targets");
-    let intervals = answer.network.intervals.as_ref();
-    for (index, (target, &value)) in answer.network.problem.targets.iter().zip(&answer.values).enumerate() {
-        let half_width = intervals.and_then(|intervals| intervals.half_width(index, value));
-        let half_width = half_width.map(|half_width| format!(" ± {}", format_number(half_width)));
-        let hint = "Latest decoded value, ± half-width of its 90 % prediction interval if the network has one.";
-        let value = format!("{}{}", format_number(value), half_width.unwrap_or_default());
-        fact_ui(ui, &target.title(), hint, &value);
-    }
-}
-
-/// Shows confidence, the stream, and of an array the unloaded state and the recording; warnings above everything else.
+/// Shows the latest values, confidence, the stream, and of an array the unloaded state and the recording; warnings above
+/// everything else.
 fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shared, effects: &mut Vec<Effect>) {
     if let Some((_, consequence)) = &answer.fault {
         note_ui(ui, consequence);
+    }
+    if let Some(TimeSeries { targets, intervals, .. }) = answer.series() {
+        section_heading_ui(ui, "Targets");
+        for (index, (target, &value)) in targets.iter().zip(&answer.values).enumerate() {
+            let half_width = intervals.and_then(|intervals| intervals.half_width(index, value));
+            let half_width = half_width.map(|half_width| format!(" ± {}", format_number(half_width)));
+            let hint = "Latest decoded value, ± half-width of its 90 % prediction interval if the network has one.";
+            let value = format!("{}{}", format_number(value), half_width.unwrap_or_default());
+            fact_ui(ui, &target.title(), hint, &value);
+        }
     }
     section_heading_ui(ui, "Confidence");
     let palette = Theme::of(ui).palette;
@@ -235,20 +241,11 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
         coloured_fact_ui(ui, fact.name, &fact.hint, &fact.value, colour);
     }
     section_heading_ui(ui, "Stream");
-    stream_ui(ui, &view.shown.counts);
-    if answer.readings.is_some() {
-        zero_ui(ui, view);
-        recording_ui(ui, view, shared, effects);
-    }
-    ui.add_space(space(2));
-}
-
-/// Shows latency and losses of the stream.
-fn stream_ui(ui: &mut Ui, counts: &Tally) {
+    let counts = &view.shown.counts;
     let hint = "Time from reading a frame to its answer: median and 99th percentile.";
     let quantile = |share| counts.latencies.quantile(share);
     let [median, high] = [0.5, 0.99].map(|share| quantile(share).map_or_else(|| format_number(None), format_duration));
-    fact_ui(ui, "Latency", hint, &format!("p50 {median}, p99 {high}"));
+    fact_ui(ui, "Latency", hint, &format!("median {median}, 99 % within {high}"));
     fact_ui(ui, "Decoded", "Frames since the start.", &counts.decoded.to_string());
     let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
     fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
@@ -257,6 +254,11 @@ fn stream_ui(ui: &mut Ui, counts: &Tally) {
     if let Some(reason) = &counts.last_bad {
         dim_ui(ui, &format!("Last: {reason}"));
     }
+    if answer.readings.is_some() {
+        zero_ui(ui, view);
+        recording_ui(ui, view, shared, effects);
+    }
+    ui.add_space(space(2));
 }
 
 fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
@@ -285,8 +287,13 @@ fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
         return;
     };
     section_heading_ui(ui, "Recording");
-    let length = format!("{}, {:.1} s", counted(recorded.frames, "frame"), recorded.seconds);
-    dim_ui(ui, &format!("Recorded {length}.")).on_hover_text(recorded.path.display().to_string());
+    let name = recorded.path.file_name().unwrap_or_default().display();
+    let text = format!(
+        "Recorded {}, {:.1} s: {name}",
+        counted(recorded.frames, "frame"),
+        recorded.seconds
+    );
+    dim_ui(ui, &text).on_hover_text(recorded.path.display().to_string());
     let replay = ui.add_enabled(recorded.frames > 0, ghost_button("Replay recording"));
     let hint = "Replays it with the network on the left. Export saves a copy of it.";
     if replay.on_hover_text(hint).clicked() {

@@ -15,15 +15,15 @@ use decoupler_core::{
     job::Job,
     live::{DriftMonitor, FaultEvent, FaultyWire, ZeroGains},
     problem::Problem,
+    scene::Indenter,
     surface::SurfaceMap,
     text::{capitalised, counted},
 };
 use decoupler_files::{
     export::{NetworkFile, format_number, format_percent},
     figure::{
-        HeatMap, PlotFigure, TargetSurface, readings_figure,
+        HeatMap, PlotAxis, TargetSurface, TimeSeries, readings_figure,
         surface::{Quantity, Surface},
-        targets_over_time_figure,
     },
     live::{
         History, Input, Keeping, LiveArray, Note, Recorded, ReplayState, Session, SessionError, SessionEvent,
@@ -31,8 +31,9 @@ use decoupler_files::{
     },
 };
 use glam::DVec3;
+use ndarray::Array2;
 
-use crate::window::{glossary, job::Report};
+use crate::window::{glossary, job::Report, timeline};
 
 /// Message to the thread.
 pub enum Request {
@@ -198,14 +199,30 @@ pub struct Answered {
     pub readings: Option<HeatMap>,
     /// Rows and columns of the readings whose wires are faulty, from 0.
     pub faulty: [Vec<usize>; 2],
-    /// The values of a network of a recording over time.
-    pub chart: Option<PlotFigure>,
+    /// Of a network of a recording: first samples after gaps, times from the start in seconds, and samples × targets.
+    pub over_time: Option<(Vec<usize>, Vec<f64>, Array2<f64>)>,
     /// All of them: of a recording, from its beginning.
     pub history: History,
     /// How far the answer can be trusted.
     pub confidence: Vec<Fact>,
     /// The current fault of the wires, and its consequence.
     pub fault: Option<(String, String)>,
+}
+
+impl Answered {
+    /// Returns the values of a network of a recording over time.
+    pub fn series(&self) -> Option<TimeSeries<'_>> {
+        let (gaps, places, decoded) = self.over_time.as_ref()?;
+        Some(TimeSeries {
+            targets: &self.network.problem.targets,
+            axis: PlotAxis::linear("time (s)"),
+            places,
+            gaps,
+            decoded: decoded.view(),
+            actual: None,
+            intervals: self.network.intervals.as_ref(),
+        })
+    }
 }
 
 /// A figure with its name and meaning.
@@ -243,6 +260,8 @@ pub struct Screen {
     noise: f64,
     nodes: Arc<[String]>,
     surfaces: Surfaces,
+    /// Largest drop of a reading under a full press in the middle.
+    full_press_percent: Option<f64>,
 }
 
 /// Returns the surfaces of the last answer.
@@ -298,6 +317,7 @@ impl Screen {
             noise: plan.noise.relative,
             nodes,
             surfaces,
+            full_press_percent: None,
         }
     }
 
@@ -324,8 +344,8 @@ impl Screen {
         }
     }
 
-    fn answered(&self, session: &Session) -> Answered {
-        let (last, problem) = (&session.last, &self.network.problem);
+    fn answered(&mut self, session: &Session) -> Answered {
+        let last = &session.last;
         let mut answered = Answered {
             network: Arc::clone(&self.network),
             time_s: last.time_s,
@@ -334,15 +354,23 @@ impl Screen {
             nodes: Arc::clone(&self.nodes),
             readings: None,
             faulty: Default::default(),
-            chart: None,
+            over_time: None,
             history: session.history.clone(),
             confidence: Vec::new(),
             fault: None,
         };
         let Some(array) = &session.array else {
             let history = session.history.until(last.time_s);
-            let intervals = self.network.intervals.as_ref();
-            answered.chart = Some(targets_over_time_figure(&problem.targets, &history, intervals));
+            // Times of a recording begin at 0 s, too.
+            let start_s = match &session.input {
+                Input::Replay(replay) => last.time_s - replay.state.at_s,
+                _ => 0.0,
+            };
+            let places = Vec::from_iter(history.iter().map(|(time_s, _)| time_s - start_s));
+            let problem = &self.network.problem;
+            let shape = (places.len(), problem.targets.len());
+            let decoded = Array2::from_shape_fn(shape, |(sample, target)| history[sample].1[target]);
+            answered.over_time = Some((timeline::gaps(&places), places, decoded));
             let outside = outside(session, problem.feature_count(), "target");
             answered.confidence = vec![outside, self.drift(session)];
             return answered;
@@ -368,15 +396,21 @@ impl Screen {
         answered
     }
 
-    /// Returns the map of the readings. Its colours span the drops of the training, so that they mean the same in every frame.
-    fn readings(&self, array: &LiveArray, frame_ohm: &[f64]) -> HeatMap {
-        let lowest_ohm = (0..array.rows.len()).flat_map(|row| {
-            let inputs = self.network.network.at(row).inputs();
-            let lowest_ohm = |column| inputs.range().map_or(0.0, |range| range.extremes(column).0);
-            (0..inputs.channels()).map(lowest_ohm)
+    /// Returns the map of the readings. Its colours span the drops under a full press in the middle, so that they mean the same
+    /// in every frame.
+    fn readings(&mut self, array: &LiveArray, frame_ohm: &[f64]) -> HeatMap {
+        let largest_percent = *self.full_press_percent.get_or_insert_with(|| {
+            let (sensor, rows) = (&array.sensor, &array.rows);
+            let scene = self.network.problem.sensor.as_ref().map(|simulation| simulation.scene);
+            let depth_mm = scene.unwrap_or_default().stroke_mm(&sensor.geometry);
+            let (row, node) = (rows[rows.len() / 2], sensor.scale.nodes_per_row() / 2);
+            let place_mm = sensor.geometry.row_node_mm(sensor.scale, row, node).truncate();
+            let pressed = Indenter::default().press(sensor, place_mm, depth_mm);
+            let of_row = |row: &usize| sensor.row_resistances(*row, pressed.row_mm(*row));
+            let pressed_ohm: Result<Vec<_>, _> = rows.iter().map(of_row).collect();
+            let drops_percent = pressed_ohm.map(|ohm| array.drops_percent(&ohm.concat()));
+            drops_percent.map_or(100.0, |drops| drops.into_iter().fold(0.1, f64::max))
         });
-        let drops_percent = array.drops_percent(&Vec::from_iter(lowest_ohm));
-        let largest_percent = drops_percent.into_iter().fold(0.5, f64::max);
         readings_figure(array.drops_percent(frame_ohm), &array.rows, largest_percent)
     }
 

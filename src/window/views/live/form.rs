@@ -79,20 +79,12 @@ impl SourceForm {
         self.noise.unwrap_or(of_scene)
     }
 
-    /// Returns the kind of source: a network of a recording has no sensor model to simulate.
-    fn kind(&self, has_sensor: bool) -> SourceKind {
-        match self.kind {
-            SourceKind::Simulated if !has_sensor => SourceKind::Replay,
-            kind => kind,
-        }
-    }
-
     /// Returns the source. This is called in every frame and does not access the file system.
     ///
     /// # Errors
     /// If a field is empty or invalid, with what to do.
-    pub fn plan(&self, has_sensor: bool) -> Result<SourcePlan, String> {
-        Ok(match self.kind(has_sensor) {
+    pub fn plan(&self) -> Result<SourcePlan, String> {
+        Ok(match self.kind {
             SourceKind::Simulated => SourcePlan::Simulated(self.frames_per_second),
             SourceKind::Replay if self.path.trim().is_empty() => {
                 return Err("Choose the file to replay.".to_owned());
@@ -109,19 +101,19 @@ impl SourceForm {
         })
     }
 
-    /// Shows the fields of a kind.
-    fn fields_ui(&mut self, ui: &mut Ui, kind: SourceKind) {
+    /// Shows the fields of the chosen kind.
+    fn fields_ui(&mut self, ui: &mut Ui) {
         let lines = "Lines of CSV. Of an array: the number of the row-wire and its resistances in ohm, or a whole snapshot in \
                      one line, row by row. Of another sensor: the inputs of the network in their order, or under their names \
                      in a header.";
-        match kind {
+        match self.kind {
             SourceKind::Simulated => {
                 let hint = "Rate at which the simulated array is read.";
                 let rate = &mut self.frames_per_second;
                 quantity_ui(ui, "Frames per second", hint, rate, 0.1..=10_000.0, "Hz");
             }
             SourceKind::Replay => {
-                text_ui(ui, "File", FRAMES.description, &mut self.path);
+                text_ui(ui, "File to replay", FRAMES.description, &mut self.path);
                 // The field shows only the beginning of a long path.
                 let path = Path::new(self.path.trim());
                 if let (Some(name), true) = (path.file_name(), path.is_absolute()) {
@@ -168,12 +160,13 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
                 (SourceKind::Tcp, "TCP"),
             ];
             let kinds = if has_sensor { &kinds[..] } else { &kinds[1..] };
-            let kind = view.source.kind(has_sensor);
-            let picked = segmented_ui(ui, "Source", kinds, kind, false);
-            view.source.kind = picked.unwrap_or(view.source.kind);
+            let kind = view.source.kind;
+            // A network of a recording has no sensor model to simulate.
+            let kind = if has_sensor || kind != SourceKind::Simulated { kind } else { SourceKind::Replay };
+            view.source.kind = segmented_ui(ui, "Source", kinds, kind, false).unwrap_or(kind);
             ui.add_space(space(1));
-            view.source.fields_ui(ui, kind);
-            if kind == SourceKind::Replay {
+            view.source.fields_ui(ui);
+            if view.source.kind == SourceKind::Replay {
                 if ui.add(ghost_button("Choose file…")).on_hover_text(FRAMES.description).clicked() {
                     let (send, chosen) = channel();
                     view.chosen = Some(chosen);

@@ -24,6 +24,7 @@ use super::{
 use crate::window::{
     glossary,
     job::{Background, Wake},
+    plotting::{MAX_TRACKS, SeriesView},
     shared::{
         Command, Effect, FileInUse, FileTask, FileWords, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Tone,
         View,
@@ -44,6 +45,8 @@ pub struct LiveView {
     /// Text by which runs are searched.
     pub(super) search: String,
     pub(super) source: SourceForm,
+    /// Part of the values over time that is in view.
+    pub(super) series: SeriesView,
     /// The node under the pointer, marked on all surfaces.
     pub(super) node: Option<usize>,
     /// Path of the file that the user is asked for.
@@ -85,6 +88,7 @@ impl LiveView {
             picked: None,
             search: String::new(),
             source: SourceForm::default(),
+            series: SeriesView::default(),
             node: None,
             chosen: None,
             is_to_be_drawn: false,
@@ -127,7 +131,7 @@ impl LiveView {
         });
         Ok(SessionPlan {
             network: Arc::clone(network),
-            source: self.source.plan(simulation.is_some())?,
+            source: self.source.plan()?,
             noise: noise.unwrap_or_default(),
             zero: self.shown.zero.clone(),
             unit: Unit::Frames,
@@ -379,8 +383,9 @@ impl View for LiveView {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let count = if self.has_sensor(shared) { 4 } else { 2 };
-        for command in &COMMANDS[..count] {
+        let primary = &COMMANDS[usize::from(self.running.is_none())];
+        let others = if self.has_sensor(shared) { &COMMANDS[2..4] } else { &[] };
+        for command in others.iter().rev().chain([primary]) {
             command_ui(ui, command, self, shared, effects);
         }
     }
@@ -398,9 +403,10 @@ impl View for LiveView {
             let readings = Ok(|| readings.clone().coloured(shared.look.colours).into());
             shown.push(Shown::figure("Readings", "live-readings".to_owned(), readings));
         }
-        if let Some(chart) = &answer.chart {
+        if let Some(series) = answer.series() {
+            let figure = move || SeriesView::default().figure(&series, MAX_TRACKS, None).into();
             let (name, stem) = ("Decoded values", "live-values".to_owned());
-            shown.push(Shown::figure(name, stem.clone(), Ok(|| chart.clone().into())));
+            shown.push(Shown::figure(name, stem.clone(), Ok(figure)));
             shown.push(Shown::table(name, stem, Ok(|| values_table(answer))));
         }
         shown

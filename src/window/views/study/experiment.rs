@@ -26,7 +26,8 @@ use decoupler_files::{
 use eframe::egui::Ui;
 
 use super::{
-    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label,
+    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList,
+    value_list::{label, write_percent},
 };
 use crate::window::{
     shared::Effect,
@@ -118,9 +119,12 @@ impl ExperimentForm {
     /// If the form is not a valid experiment.
     pub fn task(&self, train: &Result<Setup, String>) -> Result<Task, String> {
         let (experiment, setup) = self.experiment(train)?;
+        let mut results = ExperimentResults::new(experiment.clone());
+        write_percent(&mut results.experiment.axis);
+        results.experiment.second_axis.as_mut().map(write_percent);
         let outcome = ExperimentOutcome {
             heading: self.heading.clone(),
-            results: ExperimentResults::new(experiment.clone()),
+            results,
             plan: setup.plan().cloned(),
             kept_bytes: 0,
         };
@@ -299,9 +303,7 @@ impl Outcome for ExperimentOutcome {
             .into_iter()
             .map(|text| Note::Line(Tone::Warning, text));
         let mut notes = Vec::from_iter(failures.chain(remarks));
-        if !notes.is_empty() {
-            notes.insert(0, Note::Heading("Remarks"));
-        } else if self.parts().0 == 0 && results.experiment.second_axis.is_none() {
+        if self.parts().0 == 0 && results.experiment.second_axis.is_none() {
             let text = "Our figures appear next to the published ones as the trials finish.";
             notes.push(Note::Line(Tone::Dim, text.to_owned()));
         }

@@ -4,14 +4,12 @@ use decoupler_files::{
     export::{Cell, Table},
     figure::{Figure, Ink, SequentialMap},
 };
-use eframe::egui::{Color32, CursorIcon, Label, RichText, Stroke, Ui};
+use eframe::egui::{Color32, CursorIcon, RichText, Stroke, Ui};
 
 use crate::window::{
     plotting::{cells_ui, colour, plots_ui},
-    theme::{Palette, Theme, semibold, type_size},
-    widgets::{
-        ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, section_heading_ui,
-    },
+    theme::{Palette, Theme, type_size},
+    widgets::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, section_heading_ui},
 };
 
 /// Results of a study, ready to be shown.
@@ -55,8 +53,6 @@ pub struct Row {
     pub dot: Option<Ink>,
     /// Tone of each cell.
     pub tones: Vec<Tone>,
-    /// What is known about it besides the cells.
-    pub facts: Vec<String>,
 }
 
 /// Tone of a text.
@@ -95,8 +91,6 @@ pub enum Note {
     Heading(&'static str),
     /// A sentence.
     Line(Tone, String),
-    /// An item that is marked by a click.
-    Pick(usize, String),
 }
 
 /// What is shown of a report.
@@ -124,9 +118,12 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
             TableColumn::text(title)
         };
         let texts = texts.iter().map(|row| row[place].as_str());
-        column
-            .meaning(table.columns[place].meaning)
-            .width(ColumnWidth::of_longest(texts))
+        let column = column.meaning(table.columns[place].meaning);
+        match place {
+            // Its dots take room, too.
+            0 => column,
+            _ => column.width(ColumnWidth::of_longest(texts)),
+        }
     };
     let columns = Vec::from_iter(titles.iter().map(String::as_str).enumerate().map(column));
     // Texts are sorted by their places in the list of values.
@@ -200,8 +197,8 @@ pub fn figure_ui(ui: &mut Ui, page: &Page, look: &mut Look, colours: SequentialM
     }
 }
 
-/// Shows the notes, and the facts of the marked item.
-pub fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
+/// Shows the notes.
+pub fn notes_ui(ui: &mut Ui, page: &Page) {
     let palette = Theme::of(ui).palette;
     for note in &page.notes {
         match note {
@@ -209,20 +206,6 @@ pub fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
             Note::Line(tone, text) => {
                 ui.label(RichText::new(text).size(type_size().note).color(tone.colour(&palette)));
             }
-            Note::Pick(item, text) => {
-                let shown = RichText::new(text).size(type_size().note).color(palette.accent);
-                let pick = ui.selectable_label(look.marked == Some(*item), shown);
-                let hint = "Click to mark it in the figure and the table.";
-                if pick.on_hover_text(hint).clicked() {
-                    look.marked = Some(*item);
-                }
-            }
         }
-    }
-    let mut described = page.rows.iter().filter(|row| !row.facts.is_empty());
-    if let Some(point) = described.find(|row| look.marked == Some(row.item)) {
-        section_heading_ui(ui, "Marked point");
-        ui.add(Label::new(RichText::new(&point.name).font(semibold(type_size().note))).truncate());
-        dim_ui(ui, &format!("{}.", point.facts.join("; ")));
     }
 }

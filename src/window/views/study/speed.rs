@@ -26,7 +26,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{NetworkFile, format_percent, trade_off_points, trade_off_summary},
-    figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure},
+    figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_name, trade_off_figure},
     import::{Recorded, Setup},
     machine::memory_budget,
 };
@@ -34,12 +34,13 @@ use eframe::egui::Ui;
 
 use super::{
     NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, experiment::setup_of,
+    value_list::noise_text,
 };
 use crate::window::{
     shared::{Effect, Exporting, NetworkSource, sentence},
     widgets::{
         fields::{count_ui, quantity_ui},
-        section_heading_ui, segmented_ui,
+        section_heading_ui,
     },
 };
 
@@ -53,16 +54,12 @@ pub struct SpeedForm {
     hidden: ValueList,
     /// Training methods of the networks of a recording.
     methods: ValueList,
-    /// Preset on which the settings of the networks of an array are based; `None` for both.
-    preset: Option<Preset>,
     /// Decoders, in the order of [`DecoderKind::ALL`].
     decoders: [bool; DecoderKind::ALL.len()],
     /// Maximum number of training samples of an array.
     samples: usize,
     /// Maximum number of epochs.
     epochs: usize,
-    /// Number of samples of an array on which the errors are measured.
-    test_samples: usize,
 }
 
 impl Default for SpeedForm {
@@ -72,14 +69,12 @@ impl Default for SpeedForm {
             values: values.to_owned(),
         };
         Self {
-            noises: list(AxisKind::Noise, "0, 1e-4, 1e-3, 1e-2"),
+            noises: list(AxisKind::Noise, "0.1"),
             hidden: list(AxisKind::Hidden, "6, 12"),
             methods: list(AxisKind::Method, "lm, br"),
-            preset: None,
             decoders: [true; DecoderKind::ALL.len()],
             samples: 2000,
             epochs: 60,
-            test_samples: 100,
         }
     }
 }
@@ -131,9 +126,7 @@ impl SpeedForm {
         };
         for cell in cells.iter().filter(|cell| cell.column == 0) {
             if let Some(array) = cell.settings.simulation() {
-                let presets = Preset::ALL.into_iter();
-                let presets = presets.filter(|preset| self.preset.is_none_or(|only| only == *preset));
-                plan.runs.extend(presets.map(|preset| PlannedRun {
+                plan.runs.extend(Preset::ALL.map(|preset| PlannedRun {
                     preset: Some(preset),
                     setup: self.of_preset(preset, array, cell.settings.seed).into(),
                     decoders: decoders.clone(),
@@ -165,7 +158,7 @@ impl SpeedForm {
         let source = Simulation {
             sensor: array.sensor,
             scene: Scene { rows, ..array.scene },
-            test_samples: self.test_samples,
+            test_samples: array.test_samples,
             ..of_preset
         };
         self.shortened(RunSettings {
@@ -189,21 +182,13 @@ impl SpeedForm {
     /// Shows the fields; `is_array` for a simulated array.
     pub fn fields_ui(&mut self, ui: &mut Ui, is_array: bool) {
         if is_array {
-            let hint = "Noise of each reading (standard deviation), relative to the reading, separated by commas.";
+            let hint = "Noise of each reading (standard deviation), in percent of the reading, separated by commas.";
             self.noises.ui(ui, None, hint);
         }
         let hint = "Numbers of hidden nodes of the networks, separated by commas.";
         self.hidden.ui(ui, None, hint);
-        if is_array {
-            section_heading_ui(ui, "Presets");
-            let presets = [
-                (None, "Both"),
-                (Some(Preset::Paper), "Paper"),
-                (Some(Preset::Best), "Best"),
-            ];
-            self.preset = segmented_ui(ui, "Presets", &presets, self.preset, true).unwrap_or(self.preset);
-        } else {
-            let hint = "Training methods of the networks, separated by commas.";
+        if !is_array {
+            let hint = "Training methods of the networks.";
             self.methods.ui(ui, None, hint);
         }
         section_heading_ui(ui, "Decoders");
@@ -226,8 +211,6 @@ impl SpeedForm {
         if is_array {
             let hint = "Largest number of training samples per network; a preset with fewer keeps its own number.";
             count_ui(ui, "Maximum samples", hint, &mut self.samples, 1..=LARGEST_SAMPLES);
-            let hint = "Number of samples on which the errors are measured.";
-            count_ui(ui, "Test samples", hint, &mut self.test_samples, 1..=LARGEST_SAMPLES);
         }
     }
 }
@@ -353,7 +336,7 @@ impl Level {
     fn page(&self, limits: &TradeOffLimits) -> Page {
         let table = trade_off_summary(&self.measured);
         Page {
-            name: self.measured.noise.map_or_else(String::new, |noise| noise.to_string()),
+            name: self.measured.noise.map_or_else(String::new, noise_text),
             what: "Point",
             rows: rows(&self.measured, table.columns.len()),
             table,
@@ -363,9 +346,7 @@ impl Level {
     }
 
     fn notes(&self, limits: &TradeOffLimits) -> Vec<Note> {
-        let refused = self.refused.iter();
-        let mut notes = Vec::from_iter(refused.map(|reason| Note::Line(Tone::Warning, sentence(reason))));
-        notes.push(Note::Heading("Recommended decoders"));
+        let mut notes = vec![Note::Heading("Recommended decoders")];
         let questions = [
             ("Fastest", "No measured decoder is this accurate."),
             ("Most accurate", "No measured decoder is this fast."),
@@ -378,8 +359,20 @@ impl Level {
             let point = &self.measured.points[answer];
             let (percent, time) = (point.report.errors.percent(), frame_time(point.report.frame_us));
             let (name, percent) = (point_name(point), format_percent(percent));
-            notes.push(Note::Pick(answer, format!("{question}: {name}, {percent}, {time}")));
+            notes.push(Note::Line(Tone::Own, format!("{question}: {name}, {percent}, {time}")));
         }
+        // A remark is the same in both precisions.
+        let double = self
+            .measured
+            .points
+            .iter()
+            .filter(|point| point.report.precision == Precision::Double);
+        let remarks = double.flat_map(|point| {
+            let remarks = point.report.remarks.iter();
+            remarks.map(move |remark| format!("{}: {remark}", point_name(point)))
+        });
+        let remarks = remarks.chain(self.refused.iter().cloned());
+        notes.extend(remarks.map(|remark| Note::Line(Tone::Warning, sentence(&remark))));
         notes
     }
 }
@@ -455,11 +448,6 @@ fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
     order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
     let row = |item: usize| {
         let point = &level.points[item];
-        let mut facts = point_facts(point);
-        facts.push(format!(
-            "at most {}",
-            counted(point.settings.training.stopping.epochs, "epoch")
-        ));
         let of_cost = |is_on_front| if is_on_front { Tone::Own } else { Tone::Usual };
         let mut tones = vec![Tone::Usual; columns];
         // The last columns are the costs.
@@ -470,7 +458,6 @@ fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
             meaning: "A blue time is on the Pareto front: no other point has as small an error in as little time.",
             dot: Some(Ink::of_decoder(point.report.kind)),
             tones,
-            facts,
         }
     };
     order.into_iter().map(row).collect()
@@ -514,7 +501,6 @@ mod tests {
         let form = SpeedForm {
             samples: usize::MAX,
             epochs: usize::MAX,
-            preset: Some(Preset::Best),
             ..SpeedForm::default()
         };
         let (settings, preset) = (settings(&plan(&form, base), 0.0, Preset::Best), Preset::Best.settings());
@@ -562,7 +548,7 @@ mod tests {
             form.plan(&RunSettings::default().into()).unwrap_err()
         };
         assert!(error(|form| form.noises.values = "0, much".to_owned()).contains("'much' is not a number"));
-        assert!(error(|form| form.noises.values = "2".to_owned()).contains("relative noise"));
+        assert!(error(|form| form.noises.values = "200".to_owned()).contains("relative noise"));
         assert!(error(|form| form.noises.values = " , ".to_owned()).contains("there are no values"));
         assert!(error(|form| form.decoders.fill(false)).contains("choose at least one"));
         let many = error(|form| {

@@ -120,6 +120,13 @@ impl StudyView {
             return;
         }
         self.train = shared.setup();
+        let train = self.train.as_ref().ok().filter(|setup| setup.plan().is_some());
+        if let Some(source) = train.map(Setup::source_name) {
+            // Findings about another recording are not shown.
+            let is_its = |of: &Setup| of.source_name() == source;
+            self.studies
+                .retain(|_, study| study.took.is_none() || study.setup.as_ref().is_none_or(is_its));
+        }
         self.task = self.forms[&self.topic].task(&self.train, &self.is_quiet);
         if let Ok(Task { study, .. }) = &mut self.task {
             study.report = study.outcome.report(&self.limits);
@@ -206,7 +213,12 @@ impl StudyView {
         let under_way = |topic| Some((topic, self.studies.get(&topic)?));
         let Some((topic, study)) = self.running.and_then(under_way) else {
             let Some((study, took)) = self.study().and_then(|study| Some((study, study.took?))) else {
-                return Status::new(Tone::Calm, "Ready: press Run");
+                let text = if self.can_begin() {
+                    "Ready: press Run"
+                } else {
+                    "Not ready"
+                };
+                return Status::new(Tone::Calm, text);
             };
             let (done, all, _) = study.outcome.parts();
             let (tone, ended) = match done < all {
@@ -308,12 +320,12 @@ impl View for StudyView {
         self.exports(shared.look.colours)
     }
 
-    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn form_ui(&mut self, ui: &mut Ui, _shared: &Shared, effects: &mut Vec<Effect>) {
         scrolled_ui(ui, "study form", |ui| self.fields_ui(ui, effects));
-        self.check(shared);
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
+        self.check(shared);
         let whole = ui.available_rect_before_wrap();
         let mut look = self.look;
         match (self.displayed(), &self.task) {

@@ -23,8 +23,6 @@ pub const FOLDER: FileWords = FileWords {
 
 /// Minimum time between two reads of the folder.
 const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
-/// Ratio of the pause between reads to the time of a read, so that a large folder does not keep the disk busy.
-const REST: u32 = 10;
 /// Interval at which a pause looks whether it is to end.
 const WAIT: Duration = Duration::from_millis(50);
 
@@ -48,8 +46,7 @@ fn watch(path: &Path, reporter: &Reporter) -> Result<(), String> {
             reporter.send(StudyEvent::Report(Box::new(report(path, text, page(&merged)))));
             before = Some(files);
         }
-        let pause = BETWEEN_LOOKS.max(REST * begun.elapsed());
-        while begun.elapsed() < pause && !reporter.is_cancelled() {
+        while begun.elapsed() < BETWEEN_LOOKS && !reporter.is_cancelled() {
             thread::sleep(WAIT);
         }
     }

@@ -11,7 +11,7 @@ use super::{
     sweep_folder::FOLDER,
 };
 use crate::window::{
-    shared::{Command, Effect, FileTask, FileWords, Shared, Shown},
+    shared::{Command, Effect, FileTask, FileWords, Shared, Shown, ViewKind},
     theme::{semibold, space, type_size},
     widgets::{card_ui, dim_ui, ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui},
 };
@@ -55,8 +55,8 @@ impl StudyView {
         }
         ui.add_space(space(2));
         let usual = Form::new(topic);
-        let reset = Button::new("Reset to the default values");
-        if ui.add_enabled(is_idle && form != usual, reset).clicked() {
+        let reset = || Button::new("Reset to the default values");
+        if form != usual && ui.add_enabled(is_idle, reset()).clicked() {
             form = usual;
         }
         if form != self.forms[&topic] {
@@ -101,12 +101,19 @@ impl StudyView {
         effects: &mut Vec<Effect>,
     ) {
         look.page = look.page.min(report.pages.len() - 1);
+        if self.is_outdated() {
+            ui.multiply_opacity(0.6);
+        }
         let page = &report.pages[look.page];
         let whole = ui.available_rect_before_wrap();
         let (has_table, has_notes) = (!page.table.columns.is_empty(), !page.notes.is_empty());
+        // The conditions are text of about six points a letter.
+        let lines = (6.0 * report.conditions.len() as f32 / whole.width()).ceil();
         let height = match (has_table, page.figure.is_some() || has_notes) {
-            (true, true) => (space(6) * page.rows.len() as f32 + space(28)).min(0.53 * whole.height()),
-            (false, true) => space(20),
+            (true, true) => {
+                (space(6) * (page.rows.len() + 1) as f32 + space(4) * lines + space(19)).min(0.53 * whole.height())
+            }
+            (false, true) => space(16) + space(4) * lines,
             (_, false) => whole.height(),
         };
         let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height.round());
@@ -130,7 +137,7 @@ impl StudyView {
         if has_notes {
             let gap = if share > 0.0 { space(2) } else { 0.0 };
             card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
-                scrolled_ui(ui, "notes", |ui| notes_ui(ui, page, look));
+                scrolled_ui(ui, "notes", |ui| notes_ui(ui, page));
             });
         }
     }
@@ -141,7 +148,7 @@ impl StudyView {
             ui.set_min_height(space(7));
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if self.is_outdated() {
-                    dim_ui(ui, "The recording or the settings have changed since: begin again.");
+                    dim_ui(ui, "Result of the previous settings: run again.");
                 } else if self.study().is_none_or(|study| !study.outcome.parts().2.is_empty()) {
                     self.marked_ui(ui, *look, shared, effects);
                 }
@@ -181,7 +188,7 @@ impl StudyView {
         }
         if open.clicked() {
             effects.extend(study.outcome.open(look.page, item));
-            effects.push(Effect::ShowTraining);
+            effects.push(Effect::Show(ViewKind::Train));
         }
     }
 

@@ -2,22 +2,24 @@
 //! offers a list of them, and one card draws the chosen one.
 
 use decoupler_files::figure::{
-    Decoded, Figure, HeatMap, Ink, LineAt, LineStyle, Series, histogram_figure, hysteresis_figure, loss_figure,
-    node_figure, pair_address, pair_sample, regression_figure, sample_figure, training_state_figure, value_pairs,
+    Decoded, Figure, HeatMap, Ink, LineAt, LineStyle, Series, TimeSeries, histogram_figure, hysteresis_figure,
+    loss_figure, node_figure, pair_address, pair_sample, regression_figure, training_state_figure, value_pairs,
 };
-use eframe::egui::{Ui, UiBuilder};
+use eframe::egui::{Rect, Ui, UiBuilder};
 
 use super::{
     press::readings_ui,
     scrub::{self, scrub_bar_ui},
     section::{Along, section_bar_ui, section_of},
+    surfaces::{surface_figure, surfaces_ui},
     view::TrainView,
 };
 use crate::window::{
-    plotting::{cells_ui, plots_ui},
-    shared::{Command, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
+    plotting::{MAX_TRACKS, SeriesView, cells_ui, plots_ui},
+    shared::{Command, Effect, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
+    test_view::TestView,
     theme::{Theme, space},
-    widgets::{placeholder_ui, tabs_ui},
+    widgets::{card_ui, dim_ui, placeholder_ui, tabs_ui},
 };
 
 /// A chart of the displayed result.
@@ -34,6 +36,8 @@ pub(super) struct Chart {
     items: Items,
     /// Shows what can be chosen in it.
     bar_ui: fn(&mut Ui, &mut TrainView, &Shared),
+    /// Shows its figure in a way of its own.
+    own_ui: Option<fn(&mut Ui, &mut TrainView, &Shared)>,
 }
 
 /// What the points of a chart are, which respond to the pointer.
@@ -54,6 +58,7 @@ const BARE: Chart = Chart {
     draw: |_, _| None,
     items: Items::None,
     bar_ui: |_, _, _| (),
+    own_ui: None,
 };
 
 const LOSS: Chart = Chart {
@@ -87,9 +92,9 @@ const HISTOGRAM: Chart = Chart {
     hint: "The distribution of the z errors in the test set appears here.",
     draw: |view, shared| {
         let (pairs, of) = pairs(view, shared)?;
-        Some(histogram_figure(&pairs, None, of).into())
+        Some(histogram_figure(&pairs, of).into())
     },
-    bar_ui: target_bar_ui,
+    bar_ui: lower_target_ui,
     ..BARE
 };
 
@@ -125,29 +130,23 @@ const HYSTERESIS: Chart = Chart {
     ..BARE
 };
 
-/// All targets of the sample, actual and decoded. Without surfaces it takes their place.
-pub(super) const SAMPLE: Chart = Chart {
-    name: "Sample",
-    is_offered: |shared| shared.test().is_some_and(|test| test.through().is_some()),
+/// Actual and decoded values of each target of a recording over time.
+pub(super) const SERIES: Chart = Chart {
+    name: "Over time",
+    hint: "Actual and decoded values of each target in the test set appear here, over time.",
     draw: |view, shared| {
-        let (test, result) = (shared.test().filter(|test| test.skin.is_none())?, view.result(shared)?);
-        let values = |values: ndarray::ArrayView2<'_, f64>| {
-            let is_there = view.snapshot < values.nrows();
-            is_there.then(|| values.row(view.snapshot).to_vec())
-        };
-        let [actual, decoded] = [values(test.set.targets())?, values(result.answers.view())?];
-        let targets = test.set.targets();
-        let range = |values: ndarray::ArrayView1<'_, f64>| {
-            values
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
-                    (low.min(value), high.max(value))
-                })
-        };
-        let ranges = Vec::from_iter(targets.columns().into_iter().map(range));
-        Some(sample_figure(&test.problem.targets, &actual, &decoded, &ranges).into())
+        let series = series(shared.test()?, view.result(shared)?);
+        Some(view.series.figure(&series, MAX_TRACKS, Some(view.snapshot)).into())
     },
-    items: Items::Nodes,
+    own_ui: Some(series_ui),
+    ..BARE
+};
+
+/// Surfaces through the targets of a recording; always there for an array.
+pub(super) const SURFACES: Chart = Chart {
+    name: "Surfaces",
+    is_offered: |shared| shared.test().is_some_and(|test| test.through().is_some()),
+    draw: |view, shared| Some(surface_figure(view, shared).into()),
     ..BARE
 };
 
@@ -197,45 +196,127 @@ pub(super) const SECTION: Chart = Chart {
 /// The readings, if there is no room for their own card.
 const READINGS: Chart = Chart {
     name: "Readings",
+    own_ui: Some(readings_of_view_ui),
     ..BARE
 };
 
+/// Charts below the surfaces of an array.
 const OF_ARRAY: [Chart; 7] = [LOSS, TRAINING_STATE, HISTOGRAM, REGRESSION, NODES, SECTION, READINGS];
 
-const OF_RECORDING: [Chart; 7] = [
+/// Charts of the answers for a recording, and of its training below.
+const OF_ANSWERS: [Chart; 5] = [
+    SERIES,
+    SURFACES,
+    Chart {
+        hint: "Decoded against actual values of each target in the test set appear here.",
+        ..REGRESSION
+    },
+    HYSTERESIS,
+    ERROR_MAP,
+];
+const OF_TRAINING: [Chart; 3] = [
     LOSS,
     TRAINING_STATE,
     Chart {
         hint: "The distribution of the errors of each target in the test set appears here.",
         ..HISTOGRAM
     },
-    Chart {
-        hint: "Decoded against actual values of each target in the test set appear here.",
-        ..REGRESSION
-    },
-    HYSTERESIS,
-    SAMPLE,
-    ERROR_MAP,
 ];
 
-/// Returns the charts of the current source, including the readings unless they have their own card.
+/// Returns the charts of the current source below the surfaces, including the readings unless they have their own card.
 fn charts(shared: &Shared, has_readings: bool) -> impl Iterator<Item = &'static Chart> {
     let all: &'static [Chart] = match shared.source {
         SourceKind::Array => &OF_ARRAY,
-        SourceKind::Recording => &OF_RECORDING,
+        SourceKind::Recording => &OF_TRAINING,
     };
-    let is_offered = move |chart: &&Chart| chart.name != READINGS.name || has_readings;
-    all.iter().filter(is_offered).filter(|chart| (chart.is_offered)(shared))
+    all.iter()
+        .filter(move |chart| chart.name != READINGS.name || has_readings)
 }
 
-/// Returns the name and the figure of the displayed chart; no figure before there is anything to draw.
-pub(super) fn shown_chart(view: &TrainView, shared: &Shared) -> (&'static str, Option<Figure>) {
-    let chart = charts(shared, true).find(|chart| chart.name == view.tab);
-    let chart = chart.unwrap_or(&LOSS);
-    (chart.name, chart.figure(view, shared))
+/// Returns the charts of the answers for a recording, in the card above.
+fn upper_charts(shared: &Shared) -> impl Iterator<Item = &'static Chart> {
+    OF_ANSWERS.iter().filter(|chart| (chart.is_offered)(shared))
+}
+
+/// Returns the displayed chart of the answers for a recording.
+pub(super) fn upper_chart(view: &TrainView, shared: &Shared) -> &'static Chart {
+    upper_charts(shared)
+        .find(|chart| chart.name == view.upper)
+        .unwrap_or(&SERIES)
+}
+
+/// Returns the displayed chart below.
+pub(super) fn lower_chart(view: &TrainView, shared: &Shared) -> &'static Chart {
+    charts(shared, true)
+        .find(|chart| chart.name == view.tab)
+        .unwrap_or(&LOSS)
+}
+
+/// Returns the values of the test samples of a recording over time.
+fn series<'a>(test: &'a TestView, result: &'a RunResult) -> TimeSeries<'a> {
+    TimeSeries {
+        targets: &test.problem.targets,
+        axis: test.timeline.axis.clone(),
+        places: &test.timeline.places,
+        gaps: &test.timeline.gaps,
+        decoded: result.answers.view(),
+        actual: Some(test.set.targets()),
+        intervals: result.intervals.as_ref(),
+    }
+}
+
+/// The answers for a recording: its charts in one card, or surfaces below the choice of the chart.
+pub(super) fn answers_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let chart = upper_chart(view, shared);
+    let tabs = Vec::from_iter(upper_charts(shared).map(|chart| (chart.name, chart.name)));
+    let show = |ui: &mut Ui, view: &mut TrainView| {
+        view.upper = tabs_ui(ui, "Answers", &tabs, chart.name).unwrap_or(chart.name);
+    };
+    if chart.name == SURFACES.name {
+        let (head, cards) = rect.split_top_bottom_at_y(rect.top() + space(12));
+        card_ui(ui, head, |ui| show(ui, view));
+        return surfaces_ui(ui, cards.with_min_y(cards.top() + space(2)), view, shared, effects);
+    }
+    card_ui(ui, rect, |ui| {
+        show(ui, view);
+        if let Some(Err(reason)) = shared.test().and_then(|test| test.through.as_ref()) {
+            dim_ui(
+                ui,
+                &format!("No surface goes through the positions of the targets: {reason}."),
+            );
+        }
+        chart.show(ui, view, shared);
+    });
+}
+
+/// The values over time; a click goes to a sample.
+fn series_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    let targets = shared.test().map_or(0, |test| test.problem.targets.len());
+    if targets > SeriesView::tracks(ui) {
+        target_bar_ui(ui, view, shared);
+        view.series.first = view.target;
+    }
+    let (Some(test), Some(result)) = (shared.test(), view.scrub.shown(shared)) else {
+        return placeholder_ui(ui, SERIES.hint);
+    };
+    let (series, name) = (series(test, result), |sample| test.timeline.name(sample));
+    let clicked = view.series.show(ui, "series", &series, Some(view.snapshot), name);
+    view.snapshot = clicked.unwrap_or(view.snapshot);
 }
 
 impl Chart {
+    /// Shows it in the remaining space.
+    fn show(&self, ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+        (self.bar_ui)(ui, view, shared);
+        if let Some(own_ui) = self.own_ui {
+            own_ui(ui, view, shared);
+        } else if let Some(figure) = self.figure(view, shared) {
+            self.figure_ui(ui, &figure, view, shared);
+        } else {
+            placeholder_ui(ui, self.hint);
+        }
+    }
+
     /// Returns its figure with the lit items highlighted.
     pub(super) fn figure(&self, view: &TrainView, shared: &Shared) -> Option<Figure> {
         let figure = (self.draw)(view, shared)?;
@@ -250,7 +331,7 @@ impl Chart {
     }
 
     /// Shows its figure in the remaining space. Lights up the item under the pointer, and handles a click there.
-    pub(super) fn figure_ui(&self, ui: &mut Ui, figure: &Figure, view: &mut TrainView, shared: &Shared) {
+    fn figure_ui(&self, ui: &mut Ui, figure: &Figure, view: &mut TrainView, shared: &Shared) {
         let plots = match figure {
             Figure::Plots(plots) => plots,
             Figure::HeatMap(map) => {
@@ -332,12 +413,21 @@ pub(super) fn lit_nodes(view: &TrainView, shared: &Shared) -> Vec<usize> {
 
 /// The choice of the target, where there are several.
 fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    chosen_target_ui(ui, view, shared, "target of the answers");
+}
+
+/// The same in the card below.
+fn lower_target_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    chosen_target_ui(ui, view, shared, "target of the charts");
+}
+
+fn chosen_target_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, id: &str) {
     if let Some(test) = shared
         .test()
         .filter(|test| test.skin.is_none() && shared.result().is_some())
     {
         let targets = &test.problem.targets;
-        target_choice_ui(ui, "Target", "target of the charts", targets, &mut view.target);
+        target_choice_ui(ui, "Target", id, targets, &mut view.target);
     }
 }
 
@@ -348,17 +438,13 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_re
     const NARROW: f32 = space(106);
     let is_narrow = ui.available_width() < NARROW;
     let offered = Vec::from_iter(charts(shared, has_readings));
-    let chart = offered
-        .iter()
-        .copied()
-        .find(|chart| chart.name == view.tab)
-        .unwrap_or(&LOSS);
+    let chart = offered.iter().find(|chart| chart.name == view.tab);
+    let chart = *chart.unwrap_or(&&LOSS);
     let tabs = offered.iter().map(|chart| match chart.name {
         "Training state" if is_narrow => (chart.name, "State"),
         name => (name, name),
     });
     view.tab = tabs_ui(ui, "Charts", &Vec::from_iter(tabs), chart.name).unwrap_or(chart.name);
-    (chart.bar_ui)(ui, view, shared);
     let past = shared.shown_run().map(|run| &run.past);
     let past = past.filter(|past| past.epochs().len() > 1);
     let mut place = ui.available_rect_before_wrap();
@@ -366,13 +452,7 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_re
         place.max.y -= scrub::HEIGHT;
     }
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
-        if chart.name == READINGS.name {
-            readings_of_view_ui(ui, view, shared);
-        } else if let Some(figure) = chart.figure(view, shared) {
-            chart.figure_ui(ui, &figure, view, shared);
-        } else {
-            placeholder_ui(ui, chart.hint);
-        }
+        chart.show(ui, view, shared);
     });
     if let Some(past) = past {
         scrub_bar_ui(ui, &mut view.scrub, past);
@@ -402,9 +482,16 @@ impl TrainView {
     /// Offers each chart, and the steps through sections.
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
         // The readings have their own card if there is room.
-        for chart in charts(shared, false) {
+        let has_readings = !shared.has_report(offers.ctx.content_rect().width());
+        for chart in charts(shared, has_readings) {
             if offers.offer(Command::Chart(chart.name), chart.name != self.tab) {
                 self.tab = chart.name;
+            }
+        }
+        let is_recording = shared.source == SourceKind::Recording;
+        for chart in upper_charts(shared).filter(|_| is_recording) {
+            if offers.offer(Command::Chart(chart.name), chart.name != self.upper) {
+                self.upper = chart.name;
             }
         }
         let Some(skin) = shared.skin().filter(|_| self.tab == SECTION.name) else {

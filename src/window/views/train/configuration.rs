@@ -103,18 +103,18 @@ fn settings_ui(
 
 /// Scene and samples of a simulated array.
 fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
-    let Some(&simulation) = fields.settings.simulation() else {
-        return;
-    };
     ui.add_space(space(2));
     ui.separator();
     // They stay visible while the scene is folded away.
     for warning in outlook.iter().flat_map(|outlook| &outlook.warnings) {
         note_ui(ui, &capitalised(&format!("{warning}.")));
     }
-    fold_ui(ui, "Scene", &forms::of_scene(&simulation.scene), |ui| {
-        forms::scene_ui(ui, fields);
-        forms::size_ui(ui, &simulation, outlook);
+    let scene = fields
+        .settings
+        .simulation()
+        .map(|simulation| forms::of_scene(&simulation.scene));
+    fold_ui(ui, "Scene", &scene.unwrap_or_default(), |ui| {
+        forms::scene_ui(ui, fields)
     });
     fold_ui(ui, "Samples", &forms::of_samples(fields.settings), |ui| {
         fields.show(ui, &forms::SAMPLES);

@@ -1,14 +1,10 @@
 //! What the Train view shows of the current training, for export.
 
-use decoupler_core::evaluation::DecoderReport;
-use decoupler_files::{
-    export::{decoder_table, error_table, loss_table},
-    figure::surface::ViewMode,
-};
+use decoupler_core::{evaluation::DecoderReport, problem::Channel};
+use decoupler_files::export::{Cell, Table, decoder_table, error_table, loss_table};
 
 use super::{
-    charts::shown_chart,
-    surfaces::{through, upper_figure},
+    charts::{SURFACES, lower_chart, upper_chart},
     view::TrainView,
 };
 use crate::window::{
@@ -47,29 +43,31 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     };
     let past = view.scrub.result().map(|past| past.epochs_run);
     let mut shown = networks(view, &trained, past);
-    let (name, what) = match shared.look.mode {
-        _ if shared.source == SourceKind::Recording && through(shared).is_none() => ("Sample", "sample"),
-        ViewMode::ThreeD => ("Surfaces", "surfaces"),
-        ViewMode::Top => ("Surfaces", "surfaces-top"),
+    let upper = match shared.source {
+        SourceKind::Array => &SURFACES,
+        SourceKind::Recording => upper_chart(view, shared),
     };
-    let surfaces = run.clone().map(|_| || upper_figure(view, shared));
-    shown.push(Shown::figure(name, stem(what), surfaces));
-    let (chart, figure) = shown_chart(view, shared);
-    let figure = run.clone().and_then(|_| {
-        let figure = figure.ok_or("This chart has nothing to show yet.")?;
-        Ok(move || figure.clone())
-    });
-    shown.push(Shown::figure(
-        "Chart",
-        stem(&chart.to_lowercase().replace(' ', "-")),
-        figure,
-    ));
+    let lower = lower_chart(view, shared);
+    for (name, chart) in [(upper.name, upper), ("Chart", lower)] {
+        let figure = run.clone().and_then(|_| {
+            let figure = chart.figure(view, shared);
+            let figure = figure.ok_or("This chart has nothing to show yet.")?;
+            Ok(move || figure.clone())
+        });
+        let stem = stem(&chart.name.to_lowercase().replace(' ', "-"));
+        shown.push(Shown::figure(name, stem, figure));
+    }
     let errors = trained.map(|(run, latest)| {
         let result = view.result(shared).unwrap_or(latest);
         move || error_table(&run.error_table(result))
     });
     let of_epoch = past.map(|epoch| format!("-epoch{epoch}")).unwrap_or_default();
     shown.push(Shown::table("Error table", stem("errors") + &of_epoch, errors));
+    let predictions = run.clone().and_then(|run| {
+        let result = view.result(shared).ok_or("Nothing is decoded yet.")?;
+        Ok(move || predictions_table(run, result))
+    });
+    shown.push(Shown::table("Test predictions", stem("test") + &of_epoch, predictions));
     let losses = run.clone().map(|run| || loss_table(&run.history));
     shown.push(Shown::table("Loss curves", stem("loss"), losses));
     let decoders = run.clone().and_then(|run| {
@@ -87,6 +85,35 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     });
     shown.push(Shown::file("Checkpoint", standing));
     shown
+}
+
+/// Actual and decoded values of every test sample, with the half-widths of the 90 % intervals.
+fn predictions_table(run: &RunView, result: &RunResult) -> Table {
+    let (test, intervals) = (&run.test, result.intervals.as_ref());
+    let titled = |target: &Channel, what: &str| Channel {
+        name: format!("{}_{what}", target.name),
+        ..target.clone()
+    };
+    let of_target = |target: &Channel| {
+        let half_width = intervals.map(|_| titled(target, "half_width_90"));
+        let columns = [titled(target, "actual"), titled(target, "decoded")];
+        Vec::from_iter(columns.into_iter().chain(half_width).map(|channel| channel.title()))
+    };
+    let headings = run.problem.targets.iter().flat_map(of_target);
+    let rows = (0..test.set.samples()).map(|sample| {
+        let values = (0..test.set.outputs()).flat_map(|target| {
+            let [actual, decoded] = [test.set.targets()[[sample, target]], result.answers[[sample, target]]];
+            let half_width = intervals.map(|intervals| intervals.half_width(target, decoded));
+            [Some(actual), Some(decoded)]
+                .into_iter()
+                .chain(half_width)
+                .map(Cell::Number)
+        });
+        std::iter::once(Cell::from(test.timeline.name(sample)))
+            .chain(values)
+            .collect()
+    });
+    Table::of_headings(std::iter::once("sample".to_owned()).chain(headings), rows)
 }
 
 /// Returns the best network, and before it that of the `past` epoch while it is displayed.

@@ -146,6 +146,7 @@ fn result_at(
         charts: Arc::new(test.charts(&answers)),
         remarks: Vec::new(),
         coverage: Vec::new(),
+        intervals: None,
         best_epoch: past.best_epoch,
         defect: None,
         epochs_run: epoch,
@@ -196,10 +197,13 @@ pub fn scrub_bar_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks) {
                 None => (format!("Latest, epoch {latest}"), palette.dim),
             };
             let size = Vec2::new(space(38), space(6));
-            ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
-                ui.set_min_width(size.x);
-                ui.label(RichText::new(text).size(type_size().note).color(colour));
-            });
+            // The slider is more useful where there is no room for both.
+            if ui.available_width() > size.x + space(12) {
+                ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
+                    ui.set_min_width(size.x);
+                    ui.label(RichText::new(text).size(type_size().note).color(colour));
+                });
+            }
             epoch_slider_ui(ui, scrub, past, others.len(), &epochs);
         });
     });

@@ -25,12 +25,14 @@ pub enum Along {
 }
 
 /// The wire along which the surfaces are cut.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SectionChoice {
     /// Kind of wire.
     pub along: Along,
     /// Places of the row-wire among those read, and of the column-wire; the middle ones until the user chooses.
     wires: Option<[usize; 2]>,
+    /// Pressed place that it has followed last.
+    followed_mm: Option<DVec2>,
 }
 
 /// Numbers of row-wires read and of column-wires.
@@ -69,6 +71,14 @@ impl SectionChoice {
     /// Cuts along these wires: the row-wire by its place among those read, and the column-wire.
     pub fn choose(&mut self, wires: [usize; 2]) {
         self.wires = Some(wires);
+    }
+
+    /// Cuts along the wires nearest to the pressed place whenever it moves.
+    pub fn follow(&mut self, pressed_mm: Option<DVec2>, skin: &Skin) {
+        if let Some(place_mm) = pressed_mm.filter(|_| self.followed_mm != pressed_mm) {
+            self.choose_at(place_mm, skin);
+        }
+        self.followed_mm = pressed_mm;
     }
 
     /// Cuts along the wires nearest to a place.

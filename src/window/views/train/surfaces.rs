@@ -1,9 +1,9 @@
-//! The surfaces of the Train view, or all displayed targets of the sample if a recording has no surfaces.
+//! The surfaces of the Train view.
 
 use decoupler_files::{
     export::format_number,
     figure::{
-        Figure, TargetSurface,
+        TargetSurface,
         surface::{Surface, SurfaceFigure},
     },
 };
@@ -11,24 +11,20 @@ use eframe::egui::{Align, Color32, Layout, Rect, RichText, Ui};
 use glam::DVec2;
 
 use super::{
-    charts::{SAMPLE, SECTION, lit_nodes},
+    charts::{SECTION, lit_nodes},
     press::Shown,
     view::TrainView,
 };
 use crate::window::{
-    shared::{Effect, Phase, RightCard, Shared, SourceKind, surface_cards_ui, surface_ui, view_mode_ui},
+    shared::{Effect, RightCard, Shared, surface_cards_ui, surface_ui, view_mode_ui},
     surface_view::SurfaceView,
     test_view::Drawing,
     theme::{Theme, semibold, space, type_size},
-    widgets::{card_ui, dim_ui, placeholder_ui, segmented_ui},
+    widgets::{dim_ui, placeholder_ui, segmented_ui},
 };
 
-/// Both surfaces side by side with their colour scale; all targets of the sample if a recording has no surfaces.
+/// Both surfaces side by side with their colour scale.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
-    if shared.source == SourceKind::Recording && through(shared).is_none() {
-        card_ui(ui, rect, |ui| sample_card_ui(ui, view, shared));
-        return;
-    }
     let figure = surface_figure(view, shared);
     surface_cards_ui(ui, (rect, 2), &figure, shared.look, effects, |ui, index, effects| {
         let place = [Place::Actual, Place::Network][index];
@@ -66,7 +62,7 @@ pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
 }
 
 /// The surface through the targets of a recording.
-pub(super) fn through(shared: &Shared) -> Option<&TargetSurface> {
+fn through(shared: &Shared) -> Option<&TargetSurface> {
     shared.test()?.through()
 }
 
@@ -157,9 +153,7 @@ fn side_ui(
     if marked != figure.marked_node {
         view.lights.node = marked.and_then(|node| item_at(shared, node));
     }
-    // A pressed surface is cut too.
-    let is_chosen = response.clicked() || (is_touched && response.is_pointer_button_down_on());
-    if let (true, Some(skin)) = (is_chosen && figure.section.is_some(), array)
+    if let (true, Some(skin)) = (response.clicked() && !is_touched && figure.section.is_some(), array)
         && let (Some(at), Some(sight)) = (response.interact_pointer_pos(), shown.sight)
         && let Some(place) = surface.pick(&sight.ray(DVec2::new(f64::from(at.x), f64::from(at.y))))
     {
@@ -201,34 +195,4 @@ fn node_values_ui(ui: &mut Ui, drawing: &Drawing, shared: &Shared, node: usize) 
         text += &format!(", {found} {decoded}{unit}, error {error}{unit}");
     }
     ui.label(RichText::new(text).size(type_size().note));
-}
-
-/// All displayed targets of the sample, actual next to decoded.
-fn sample_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
-    let Some(figure) = SAMPLE.figure(view, shared) else {
-        let text = match shared.phase {
-            Phase::Preparing => "The recording is being read; the first epoch follows.",
-            _ => "Press Train: the targets of each test sample appear here, actual next to decoded.",
-        };
-        return placeholder_ui(ui, text);
-    };
-    ui.horizontal(|ui| {
-        ui.set_min_height(space(7));
-        let title = format!("Test sample {}", view.snapshot + 1);
-        ui.label(RichText::new(title).font(semibold(type_size().title)));
-    });
-    if let Some(Err(reason)) = shared.test().and_then(|test| test.through.as_ref()) {
-        let text = format!("No surface goes through the positions of the targets: {reason}.");
-        dim_ui(ui, &text);
-    }
-    SAMPLE.figure_ui(ui, &figure, view, shared);
-}
-
-/// Returns the figure above the charts: the surfaces, or all targets of a sample.
-pub(super) fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
-    let surfaces = surface_figure(view, shared);
-    match SAMPLE.figure(view, shared) {
-        Some(targets) if surfaces.surfaces.is_empty() => targets,
-        _ => surfaces.into(),
-    }
 }

@@ -5,22 +5,23 @@ use eframe::egui::{Sense, Ui};
 use ndarray::Array2;
 
 use super::{
-    charts::{charts_card_ui, readings_of_view_ui},
+    charts::{answers_ui, charts_card_ui, readings_of_view_ui},
     configuration::configuration_ui,
     decoders::Decoders,
     exports::shown,
     press::{PressState, readings_head_ui},
     recording::{RecordingEditor, recipe_task},
-    report,
+    report::{self, OLD},
     scrub::ScrubState,
     section::SectionChoice,
     surfaces::surfaces_ui,
 };
 use crate::window::{
     job::Wake,
+    plotting::SeriesView,
     shared::{
-        Command, Effect, Holdings, MIN_WIDTH_FOR_REPORT, Offers, Phase, RightCard, RunResult, Shared, Shown,
-        SourceKind, Status, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, NetworkSource, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind,
+        Status, Unfinished, View, run_buttons_ui,
     },
     test_view::{Drawing, TestView},
     theme::space,
@@ -75,6 +76,12 @@ impl View for TrainView {
         if offers.offer(Command::OpenFiles, !phase.is_busy()) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
+        let ended = shared.shown_run().filter(|run| run.stop_reason.is_some());
+        if offers.offer(Command::DecodeFile, ended.is_some())
+            && let Some(run) = ended
+        {
+            effects.push(Effect::ChooseFile(NetworkSource::of(run).decode()));
+        }
         if let Some(skin) = shared.skin()
             && offers.offer(Command::PressMiddle, true)
         {
@@ -92,16 +99,19 @@ impl View for TrainView {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        run_buttons_ui(ui, shared, effects);
-        ui.add_space(space(4));
         let what = match shared.source {
             SourceKind::Array => "snapshot",
             SourceKind::Recording => "sample",
         };
         let snapshots = shared.test().map_or(0, TestView::snapshots);
-        if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, snapshots) {
-            self.show_snapshot(snapshot);
+        // In a very narrow window the keys remain.
+        if ui.ctx().content_rect().width() >= 800.0 {
+            if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, snapshots) {
+                self.show_snapshot(snapshot);
+            }
+            ui.add_space(space(4));
         }
+        run_buttons_ui(ui, shared, effects);
     }
 
     fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
@@ -161,8 +171,11 @@ pub struct TrainView {
     pub(super) target: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
-    /// Name of the chart below.
+    /// Name of the chart below, and of that of the answers for a recording.
     pub tab: &'static str,
+    pub(super) upper: &'static str,
+    /// The part of the values over time in view.
+    pub(super) series: SeriesView,
     /// Item lit by the pointer, in every picture.
     pub lights: Lighting,
     /// The wire along which the surfaces are cut.
@@ -189,6 +202,8 @@ impl TrainView {
             target: 0,
             right: RightCard::default(),
             tab: "Loss",
+            upper: "",
+            series: SeriesView::default(),
             lights: Lighting::default(),
             section: SectionChoice::default(),
             has_error_bars: false,
@@ -203,7 +218,7 @@ impl TrainView {
     /// Shows both surfaces above, the charts below, and next to them the readings of an array. In a narrow window, the report
     /// takes the place of the readings, so that the surfaces keep their width.
     fn workbench_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let is_narrow = ui.ctx().content_rect().width() < MIN_WIDTH_FOR_REPORT;
+        let is_narrow = !shared.has_report(ui.ctx().content_rect().width());
         let whole = ui.available_rect_before_wrap();
         let gap = space(2);
         let (share, least) = if is_narrow {
@@ -213,10 +228,23 @@ impl TrainView {
         };
         let lower_height = (share * whole.height()).clamp(least, space(75));
         let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-        surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), self, shared, effects);
+        let upper = upper.with_max_y(upper.max.y - gap);
         let has_sensor = shared.source == SourceKind::Array;
+        let is_old = shared.shown_run().is_some_and(|run| shared.is_old(run));
+        let opacity = if is_old { OLD } else { 1.0 };
+        match has_sensor {
+            true => surfaces_ui(ui, upper, self, shared, effects),
+            false => {
+                ui.scope(|ui| {
+                    ui.multiply_opacity(opacity);
+                    answers_ui(ui, upper, self, shared, effects);
+                });
+            }
+        }
         let width = match is_narrow {
-            true => (0.45 * lower.width()).clamp(space(82), space(96)),
+            true => (0.45 * lower.width())
+                .clamp(space(82), space(96))
+                .min(0.6 * lower.width()),
             false => (0.4 * lower.width()).floor(),
         };
         let (mut charts, beside) = lower.split_left_right_at_x(lower.right() - width);
@@ -232,7 +260,10 @@ impl TrainView {
             charts = lower;
         }
         let has_readings = is_narrow && has_sensor;
-        card_ui(ui, charts, |ui| charts_card_ui(ui, self, shared, has_readings));
+        card_ui(ui, charts, |ui| {
+            ui.multiply_opacity(opacity);
+            charts_card_ui(ui, self, shared, has_readings);
+        });
         ui.allocate_rect(whole, Sense::hover());
     }
 
@@ -240,6 +271,9 @@ impl TrainView {
     fn follow(&mut self, shared: &Shared) {
         let (test, result) = (shared.test(), self.scrub.shown(shared));
         self.press.follow(shared, result);
+        if let Some(skin) = shared.skin() {
+            self.section.follow(self.press.place_mm(), skin);
+        }
         self.snapshot = self
             .snapshot
             .min(test.map_or(0, |test| test.snapshots().saturating_sub(1)));

@@ -110,29 +110,40 @@ impl<'a> Lines<'a> {
             .id_salt(self.table.id)
             .auto_shrink([false, !self.fills])
             .animated(false);
-        let scrolled = scroll.show_viewport(ui, |ui, viewport| {
-            let (whole, _) = ui.allocate_exact_size(size, Sense::hover());
-            let mut view = viewport.translate(whole.min.to_vec2());
-            if !self.fills {
-                // All rows are laid out; an enclosing area scrolls vertically.
-                view = Rect::from_x_y_ranges(view.x_range(), whole.y_range());
-            }
-            let line_at = |y: f32| Rect::from_min_size(pos2(whole.left(), y), vec2(self.width, height));
-            let mut click = self.head_ui(ui, line_at(view.top()));
-            let (clip, id) = (ui.clip_rect(), ui.scope_id().with(self.table.id));
-            let body = clip.with_min_y(clip.top().max(view.top() + height));
-            let first = ((view.top() - whole.top()) / height).max(0.0).floor() as usize;
-            let last = (((view.bottom() - whole.top()) / height - 1.0).max(0.0).ceil() as usize).min(rows);
-            for place in first..last {
-                let line = line_at(whole.top() + (place + 1) as f32 * height);
-                let mut line_ui = ui.new_child(UiBuilder::new().max_rect(line).scope_id(id.with(place)));
-                line_ui.set_clip_rect(body);
-                let is_last = place + 1 == rows;
-                click = click.or(self.line_ui(&mut line_ui, place, is_last, row(place)));
-            }
-            click
+        let table = UiBuilder::new().accessibility_role(Role::Table);
+        let scrolled = ui.scope_builder(table, |ui| {
+            scroll.show_viewport(ui, |ui, viewport| {
+                let (whole, _) = ui.allocate_exact_size(size, Sense::hover());
+                let mut view = viewport.translate(whole.min.to_vec2());
+                if !self.fills {
+                    // All rows are laid out; an enclosing area scrolls vertically.
+                    view = Rect::from_x_y_ranges(view.x_range(), whole.y_range());
+                }
+                let line_at = |y: f32| Rect::from_min_size(pos2(whole.left(), y), vec2(self.width, height));
+                let mut click = self.head_ui(ui, line_at(view.top()));
+                let (clip, id) = (ui.clip_rect(), ui.scope_id().with(self.table.id));
+                let body = clip.with_min_y(clip.top().max(view.top() + height));
+                let first = ((view.top() - whole.top()) / height).max(0.0).floor() as usize;
+                let last = (((view.bottom() - whole.top()) / height - 1.0).max(0.0).ceil() as usize).min(rows);
+                for place in first..last {
+                    let line = line_at(whole.top() + (place + 1) as f32 * height);
+                    let row = row(place);
+                    // A row with a label is a control.
+                    let role = if row.label.is_empty() {
+                        Role::Row
+                    } else {
+                        Role::GenericContainer
+                    };
+                    let builder = UiBuilder::new().max_rect(line).accessibility_role(role);
+                    let mut line_ui = ui.new_child(builder.scope_id(id.with(place)));
+                    line_ui.set_clip_rect(body);
+                    let is_last = place + 1 == rows;
+                    click = click.or(self.line_ui(&mut line_ui, place, is_last, row));
+                }
+                click
+            })
         });
-        scrolled.inner
+        scrolled.inner.inner
     }
 
     /// Shows the header. Returns the sort order that the user chose with it.
@@ -321,7 +332,7 @@ fn label_ui(ui: &Ui, rect: Rect, id: impl AsIdSalt, label: &str, meaning: &str) 
     }
     let response = ui.interact(rect, ui.scope_id().with(id), Sense::hover());
     if !label.is_empty() {
-        response.widget_info(|| WidgetInfo::labeled(Role::Label, true, label));
+        response.widget_info(|| WidgetInfo::labeled(Role::Cell, true, label));
     }
     if !meaning.is_empty() {
         response.on_hover_text(meaning);

@@ -76,6 +76,11 @@ impl PressState {
         self.place_mm.is_some()
     }
 
+    /// Returns the pressed place.
+    pub fn place_mm(&self) -> Option<DVec2> {
+        self.place_mm
+    }
+
     /// What is shown of the touch; `None` while the test set is displayed, or before the first answer.
     pub fn shown(&self) -> Option<&Shown> {
         self.answered.as_ref()?.1.as_ref().ok()
