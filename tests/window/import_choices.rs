@@ -150,7 +150,6 @@ fn the_last_chosen_group_applies_and_a_wrong_layout_loses_no_choices() {
     driver.mean("v", "group");
     driver.mean("block", "group");
     driver.mean("u", "unused");
-    driver.enter("Unit of force", "mN");
     // A single column of text, which cannot be used.
     set_layout(&mut driver, "Separator", "tab");
     assert!(!driver.has("Meaning of block"));
@@ -163,7 +162,6 @@ fn the_last_chosen_group_applies_and_a_wrong_layout_loses_no_choices() {
     let plan = saved_plan(&mut driver, &folder);
     assert_eq!(plan.division.by, SplitBy::Group);
     assert_eq!(plan.import.group.as_deref(), Some("block"));
-    assert_eq!(plan.import.units.get("force").map(String::as_str), Some("mN"));
 }
 
 fn choose_test_file(driver: &mut Driver, path: &Path) {
@@ -199,25 +197,18 @@ fn another_test_file_replaces_the_first() {
 }
 
 #[test]
-fn each_joined_recording_takes_one_test_file_and_no_more() {
+fn joined_recordings_and_their_files_for_the_test_are_opened_together() {
     let folder = tempfile::tempdir().unwrap();
-    let (sensor, states) = sensor_and_states(80);
-    let (short_sensor, short_states) = sensor_and_states(30);
-    let file = |name: &str, text: &str| written(&folder, name, text);
-    let (sensor, states) = (file("sensor.csv", &sensor), file("states.csv", &states));
-    let (one, two) = (file("a.csv", &short_sensor), file("b.csv", &short_states));
-    let mut driver = Driver::open();
-    driver.open_recordings(&[&states, &sensor]);
-    choose_test_file(&mut driver, &one);
-    driver.wait("what is missing", |driver| {
-        driver.says("states.csv has no file for the test yet")
+    let files = [(80, ""), (30, "_test")].map(|(rows, end)| {
+        let (sensor, states) = sensor_and_states(rows);
+        let file = |name: &str, text: &str| written(&folder, &format!("{name}{end}.csv"), text);
+        [file("sensor", &sensor), file("states", &states)]
     });
-    choose_test_file(&mut driver, &two);
-    driver.wait("its samples", |driver| driver.has("Test: 30"));
-    let third = file("c.csv", "1,2\n");
-    choose_test_file(&mut driver, &third);
-    assert!(driver.says("close those files first"), "{:#?}", driver.texts());
-    assert!(driver.has("Test: 30") && !driver.says("c.csv, for the test"));
+    let mut driver = Driver::open();
+    driver.open_recordings(&Vec::from_iter(files.iter().flatten().map(|path| path.as_path())));
+    assert!(driver.has("Test: 30"), "{:#?}", driver.texts());
+    driver.click("Close states_test.csv");
+    driver.wait("a share for the test", |driver| driver.has("Test: 16"));
 }
 
 #[test]

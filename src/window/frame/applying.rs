@@ -25,8 +25,8 @@ impl DecouplerWindow {
     pub fn apply(&mut self, effect: Effect) {
         let shared = &mut self.shared;
         match effect {
-            Effect::Configure(draft) => self.configure(*draft),
-            Effect::ConfigureRecording(settings) => {
+            Effect::Configure(draft) if draft.simulation().is_some() => self.configure(*draft),
+            Effect::Configure(settings) => {
                 // Settings that the user gives are not chosen, except for those that a choice keeps.
                 let RunSettings { source, seed, .. } = *settings;
                 let kept = RunSettings {
@@ -277,9 +277,6 @@ impl DecouplerWindow {
                 let _ = chosen.send(path);
                 self.ctx.request_repaint();
             }
-            // A training may have begun while the desktop's dialog was open.
-            Purpose::Open if self.shared.phase.is_busy() => {}
-            Purpose::Open => self.begin(Origin::File(path)),
         }
     }
 

@@ -149,9 +149,6 @@ impl DecouplerWindow {
                     Matter::Training
                 };
                 self.refuse(matter, reason);
-                if let Some(path) = self.opened.clone() {
-                    self.views.look_for_recordings(path);
-                }
             }
             Event::Left(question) => {
                 self.notices.settle(Matter::CutShort);

@@ -8,10 +8,8 @@ use super::{Exporting, FileTask, Look, RunsRequest, SourceKind, ToCopy, ViewKind
 /// Request of a view to the window, which applies all of them in one place once everything is drawn.
 #[derive(Clone, Debug)]
 pub enum Effect {
-    /// Change the settings of the next training.
+    /// Change the settings of the next training on their source.
     Configure(Box<RunSettings>),
-    /// Change the settings of the next training on a recording.
-    ConfigureRecording(Box<RunSettings>),
     /// Choose the settings of a training on a recording automatically, or not.
     ChooseAutomatically(bool),
     /// Use this plan of an import for the next training, or show what it lacks.

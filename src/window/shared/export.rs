@@ -381,8 +381,6 @@ pub struct FileWords {
 /// Action on a file once its path is known.
 #[derive(Clone, Debug)]
 pub enum Purpose {
-    /// Open the training saved in it.
-    Open,
     /// Pass its path to the view that asked for it.
     Choose(Sender<PathBuf>),
     /// Write it.

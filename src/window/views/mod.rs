@@ -54,11 +54,6 @@ impl Views {
         self.train.recording.open_plan(plan);
     }
 
-    /// Looks for the recordings of the checkpoint at `path`, which could not be resumed.
-    pub fn look_for_recordings(&mut self, path: PathBuf) {
-        self.train.recording.look_for_recordings(path);
-    }
-
     /// Returns true if the user has opened a recording, also one whose files are missing.
     pub fn has_recording(&self) -> bool {
         !self.train.recording.is_empty()

@@ -193,7 +193,7 @@ fn relative(path: &Path, folder: &Path, home: Option<&Path>) -> PathBuf {
 }
 
 /// Origin of recorded samples: the plan that reads them, and checksums that identify its files and samples.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recorded {
     /// Files, meanings of their columns, and split of their samples.
@@ -214,7 +214,7 @@ pub struct Recorded {
 }
 
 /// Checksum of a file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FileChecksum {
     /// Path of the file, as in the plan.

@@ -43,10 +43,8 @@ pub fn configuration_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &S
     });
     forms::follow_preset(&before, &mut settings);
     if settings != before {
-        effects.push(match shared.source {
-            SourceKind::Array => Effect::Configure(Box::new(settings)),
-            SourceKind::Recording => Effect::ConfigureRecording(Box::new(settings)),
-        });
+        recording.follow_method(&before, &settings);
+        effects.push(Effect::Configure(Box::new(settings)));
     }
 }
 

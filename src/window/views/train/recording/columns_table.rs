@@ -2,7 +2,7 @@
 //!
 //! It shows the range, the histogram and remarks of each column, and edits its meaning and unit.
 
-use std::{cell::Cell, ops::Range};
+use std::cell::Cell;
 
 use decoupler_core::text::counted;
 use decoupler_files::{
@@ -10,7 +10,7 @@ use decoupler_files::{
     figure::tick_text,
     import::{ColumnKind, ColumnSummary, InspectedFile, Meaning, Variable},
 };
-use eframe::egui::{Color32, ComboBox, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2, vec2};
+use eframe::egui::{Color32, Rect, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2, vec2};
 
 use super::{
     editor::RecordingEditor,
@@ -18,7 +18,7 @@ use super::{
 };
 use crate::window::{
     theme::{Palette, Theme, space},
-    widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView},
+    widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView, fields::combo_ui},
 };
 
 const MEANING_WIDTH: f32 = space(23);
@@ -35,16 +35,8 @@ const COLUMNS: [TableColumn<'_>; 7] = [
 /// Meanings of all columns of a file or a variable.
 const OF_ALL: [Meaning; 3] = [Meaning::Input, Meaning::Target, Meaning::Unused];
 
-/// A change made by the user to columns of the file with a number.
-enum Change {
-    Meaning(usize, Range<usize>, Meaning),
-    /// The rows of a variable become the samples, and its columns get a meaning.
-    Variable(usize, String, Meaning),
-    Unit(usize, usize, String),
-}
-
-/// Where a row of the table leaves the change.
-type Changed = Cell<Option<Change>>;
+/// Where a row of the table leaves a change made by the user.
+type Changed = Cell<Option<Box<dyn FnOnce(&mut Import)>>>;
 
 /// A row of the table: a file, or a variable or column of one.
 #[derive(Clone, Copy)]
@@ -68,14 +60,10 @@ impl RecordingEditor {
                 (file, heading) => heading_row(&import.files[file], (file, heading), palette, &changed),
             });
         });
-        match changed.take() {
-            None => return,
-            Some(Change::Meaning(file, columns, meaning)) => import.set_meanings(file, columns, meaning),
-            Some(Change::Variable(file, name, meaning)) => {
-                import.wanted = Some((file, name, meaning));
-                self.read_again();
-            }
-            Some(Change::Unit(file, column, unit)) => import.set_unit(file, column, &unit),
+        let Some(change) = changed.take() else { return };
+        change(import);
+        if import.wanted.is_some() {
+            self.read_again();
         }
         ui.request_repaint();
     }
@@ -110,34 +98,28 @@ fn heading_row<'a>(
             0..of.meanings.len(),
         ),
     };
-    let is_left_out = columns.is_empty();
-    let (text, offered, colour) = if is_left_out {
-        ("left out", &OF_ALL[..2], palette.dim)
-    } else {
-        ("set all…", &OF_ALL[..], palette.text)
-    };
-    let is_file = matches!(line, Line::File);
+    let (is_left_out, is_file) = (columns.is_empty(), matches!(line, Line::File));
+    let colour = if is_left_out { palette.dim } else { palette.text };
     let name_cell = TableCell::new(name.clone()).colour(colour).strong(is_file);
-    let combo = move |ui: &mut Ui| {
-        let options = Vec::from_iter(offered.iter().map(|meaning| (*meaning, format!("all {meaning}"))));
-        let Some(meaning) = combo_ui(ui, &format!("{whole} {name}"), text, &options, None) else {
-            return;
-        };
-        changed.set(Some(if is_left_out {
-            Change::Variable(file, name, meaning)
-        } else {
-            Change::Meaning(file, columns, meaning)
-        }));
+    let controls = move |ui: &mut Ui| {
+        if is_left_out {
+            let button = ui.small_button("Use its rows").on_hover_text(LEFT_OUT);
+            button.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Use the rows of {name}")));
+            if button.clicked() {
+                changed.set(Some(Box::new(move |import| import.wanted = Some((file, name)))));
+            }
+        } else if let Some(meaning) = meaning_ui(ui, &format!("{whole} {name}"), &OF_ALL, None) {
+            let change = move |import: &mut Import| import.set_meanings(file, columns, meaning);
+            changed.set(Some(Box::new(change)));
+        }
     };
-    let mut cells = vec![name_cell, TableCell::controls(combo)];
+    let mut cells = vec![name_cell, TableCell::controls(controls)];
     cells.extend((0..4).map(|_| TableCell::default()));
-    let meaning = if is_left_out { LEFT_OUT } else { "" };
-    cells.push(TableCell::new(size).colour(palette.dim).meaning(meaning));
+    cells.push(TableCell::new(size).colour(palette.dim));
     TableRow::new(cells)
 }
 
-const LEFT_OUT: &str =
-    "Left out, because its rows are not the samples. Choose its meaning to make its rows the samples.";
+const LEFT_OUT: &str = "Left out, because its rows are not the samples. Makes its rows the samples.";
 
 fn column_row<'a>(
     import: &'a Import,
@@ -157,15 +139,16 @@ fn column_row<'a>(
     let names = [name.clone(), format!("Unit of {name}"), format!("Histogram of {name}")];
     let [of_meaning, of_unit, of_histogram] = names;
     let meaning_cell = move |ui: &mut Ui| {
-        let options = Vec::from_iter(Meaning::ALL.iter().map(|option| (*option, option.to_string())));
-        let picked = combo_ui(ui, &of_meaning, &meaning.to_string(), &options, Some(meaning));
-        let change = picked.map(|picked| Change::Meaning(file, column..column + 1, picked));
-        changed.set(change.or(changed.take()));
+        if let Some(picked) = meaning_ui(ui, &of_meaning, Meaning::ALL, Some(meaning)) {
+            let change = move |import: &mut Import| import.set_meanings(file, column..column + 1, picked);
+            changed.set(Some(Box::new(change)));
+        }
     };
     let unit_cell = move |ui: &mut Ui| {
-        if matches!(meaning, Meaning::Input | Meaning::Target) {
-            let unit = unit_ui(ui, of_unit, &import.unit(file, column));
-            changed.set(unit.map(|unit| Change::Unit(file, column, unit)).or(changed.take()));
+        if matches!(meaning, Meaning::Input | Meaning::Target)
+            && let Some(unit) = unit_ui(ui, of_unit, import.unit(file, column))
+        {
+            changed.set(Some(Box::new(move |import| import.set_unit(file, column, unit))));
         }
     };
     let histogram_cell = move |ui: &mut Ui| {
@@ -181,10 +164,6 @@ fn column_row<'a>(
         0 => "–".to_owned(),
         missing => missing.to_string(),
     };
-    let mut variables = inspected.variables.iter();
-    let shape = variables
-        .find(|variable| variable.columns == (column..column + 1))
-        .map(|variable| variable.shape.clone());
     let remark = remark(summary, column);
     let is_bad = remark.is_some() && !is_unused;
     let remark_colour = if is_bad { palette.warning } else { palette.dim };
@@ -195,44 +174,22 @@ fn column_row<'a>(
         TableCell::controls(histogram_cell),
         TableCell::new(range).colour(colour),
         TableCell::new(missing).colour(colour),
-        TableCell::new(remark.or(shape).unwrap_or_default()).colour(remark_colour),
+        TableCell::new(remark.unwrap_or_default()).colour(remark_colour),
     ]);
     row.named(name)
 }
 
-/// A choice of the meaning `of` something. Returns the one newly picked.
-fn combo_ui(
-    ui: &mut Ui,
-    of: &str,
-    text: &str,
-    options: &[(Meaning, String)],
-    shown: Option<Meaning>,
-) -> Option<Meaning> {
-    let mut picked = None;
-    let palette = Theme::of(ui).palette;
-    let colour = if shown == Some(Meaning::Unused) {
-        palette.dim
-    } else {
-        palette.text
-    };
-    let combo = ComboBox::from_id_salt(of)
-        .selected_text(RichText::new(text).color(colour))
-        .width(MEANING_WIDTH);
-    let combo = combo.show_ui(ui, |ui| {
-        for (option, text) in options {
-            let choice = ui.selectable_label(Some(*option) == shown, text);
-            if choice.on_hover_text(explanation(*option)).clicked() && Some(*option) != shown {
-                picked = Some(*option);
-            }
-        }
-    });
-    let label = format!("Meaning of {of}");
-    combo
-        .response
-        .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
-    ui.ctx()
-        .accesskit_node_builder(combo.response.id, |node| node.set_value(text));
-    picked
+/// A choice of the meaning `of` something; of several columns if none is `shown`. Returns the one newly picked.
+fn meaning_ui(ui: &mut Ui, of: &str, offered: &[Meaning], shown: Option<Meaning>) -> Option<Meaning> {
+    let names = Vec::from_iter(offered.iter().map(Meaning::to_string));
+    let options = offered.iter().zip(&names);
+    let options = options.map(|(&option, name)| (Some(option), name.as_str(), explanation(option)));
+    let all = shown.is_none().then_some((None, "set all…", ""));
+    let options = Vec::from_iter(all.into_iter().chain(options));
+    let (label, mut picked) = (format!("Meaning of {of}"), None);
+    let button = combo_ui(ui, &label, MEANING_WIDTH, &options, shown, &mut picked);
+    ui.ctx().accesskit_node_builder(button.id, |node| node.set_label(label));
+    picked.flatten()
 }
 
 fn explanation(meaning: Meaning) -> &'static str {
@@ -250,21 +207,19 @@ fn explanation(meaning: Meaning) -> &'static str {
 /// of editing. Returns the unit if it has changed.
 fn unit_ui(ui: &mut Ui, label: String, unit: &str) -> Option<String> {
     let id = ui.scope_id().with(&label);
-    // As typed, including trailing spaces, which are not part of the unit.
-    let kept: Option<String> = ui.data(|data| data.get_temp(id));
-    let mut typed = kept.clone().unwrap_or_else(|| unit.to_owned());
-    let edit = ui.add(
-        TextEdit::singleline(&mut typed)
-            .id(id)
-            .desired_width(UNIT_WIDTH - space(2)),
-    );
+    // As typed, with trailing spaces, and empty where the unit of the header applies again.
+    let kept = ui.data(|data| data.get_temp(id));
+    let mut typed = kept.unwrap_or_else(|| unit.to_owned());
+    let edit = TextEdit::singleline(&mut typed).desired_width(UNIT_WIDTH - space(2));
+    let edit = ui.add(edit.id(id));
     ui.ctx().accesskit_node_builder(edit.id, |node| node.set_label(label));
-    if !edit.has_focus() && kept.is_some() {
+    let picked = typed.trim().to_owned();
+    if edit.has_focus() {
+        ui.data_mut(|data| data.insert_temp(id, typed));
+    } else {
         ui.data_mut(|data| data.remove::<String>(id));
-    } else if edit.changed() {
-        ui.data_mut(|data| data.insert_temp(id, typed.clone()));
     }
-    (edit.changed() && typed.trim() != unit).then_some(typed)
+    (edit.changed() && picked != unit).then_some(picked)
 }
 
 /// Returns the ends of a range: with enough decimals to distinguish them or, if that is too long, rounded, with the width if they
@@ -272,15 +227,13 @@ fn unit_ui(ui: &mut Ui, label: String, unit: &str) -> Option<String> {
 fn range_text(min: f64, max: f64) -> String {
     /// Because a truncated figure would be wrong.
     const MAX_CHARACTERS: usize = 26;
-    let span = max - min;
-    let number = |value: f64| format_number(value).replace('-', "−");
-    let is_ordinary = (1e-6..1e12).contains(&span) && min.abs().max(max.abs()) < 1e12;
-    let exact = is_ordinary.then(|| [min, max].map(|end| tick_text(end, span / 100.0)).join(" – "));
-    match (exact, [min, max].map(number)) {
-        (_, [end, _]) if min == max => end,
-        (Some(exact), _) if exact.chars().count() <= MAX_CHARACTERS => exact,
-        (_, [min, max]) if min == max => format!("{min}, width {}", number(span)),
-        (_, ends) => ends.join(" – "),
+    let ends = [min, max].map(|end| format_number(end).replace('-', "−"));
+    let exact = [min, max].map(|end| tick_text(end, (max - min) / 100.0)).join(" – ");
+    match ends {
+        [end, _] if min == max => end,
+        _ if exact.chars().count() <= MAX_CHARACTERS => exact,
+        [one, other] if one == other => format!("{one}, width {}", format_number(max - min)),
+        ends => ends.join(" – "),
     }
 }
 

@@ -15,10 +15,7 @@ use super::{
 };
 use crate::window::{
     job::Wake,
-    shared::{
-        Effect, FileInUse, FileTask, FileWords, Matter, Notice, Purpose, RecordingDraft, RunsRequest, Shared,
-        SourceKind,
-    },
+    shared::{Effect, FileInUse, FileTask, Matter, Notice, RecordingDraft, RunsRequest, Shared, SourceKind},
     training_worker::RunId,
 };
 use decoupler_core::{
@@ -27,7 +24,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::RunSummary,
-    import::{Meaning, Plan, Setup, Watch},
+    import::{FileSet, Plan, Setup, Watch},
 };
 
 /// Editor of the recording that is trained on: its files, the meaning of their columns, and the division of the samples.
@@ -44,16 +41,10 @@ pub struct RecordingEditor {
     pub(super) reading: Reading,
     /// Texts in the fields of options that are not in the plan, by the names of the options, with the reason if they were refused.
     pub(super) typed: BTreeMap<&'static str, (String, Option<String>)>,
-    /// True if the user is viewing the columns while there is a run to show.
-    pub(super) shows_columns: bool,
+    /// The run in whose place the user is viewing the columns.
+    pub(super) hidden: Option<RunId>,
     /// The file asked for last, and where its path arrives.
     asked: Option<(Use, Receiver<PathBuf>)>,
-    /// True while the recordings of a checkpoint are looked for that the worker could not resume.
-    is_refused: bool,
-    /// The run that the window knew last.
-    run: Option<RunId>,
-    /// Share held out for validation that the method needs; `None` if the share of a plan is to be kept.
-    held_out: Option<f64>,
 }
 
 /// Use of a file that the user is asked for.
@@ -65,8 +56,6 @@ pub(super) enum Use {
     Missing(PathBuf),
     /// A recording of test samples.
     Test,
-    /// Positions of the targets.
-    Positions,
 }
 
 impl RecordingEditor {
@@ -78,33 +67,25 @@ impl RecordingEditor {
             changed: Vec::new(),
             reading: Reading::new(Arc::clone(wake)),
             typed: BTreeMap::new(),
-            shows_columns: false,
+            hidden: None,
             asked: None,
-            is_refused: false,
-            run: None,
-            held_out: None,
         }
     }
 
     /// Returns the task of opening a file.
     pub fn open_task(&mut self) -> FileTask {
-        self.ask(Use::Recording, FILES, String::new())
+        self.ask(Use::Recording, String::new())
     }
 
     /// Returns the task of asking for the path of a file.
-    pub(super) fn ask(&mut self, of: Use, words: FileWords, suggestion: String) -> FileTask {
+    pub(super) fn ask(&mut self, of: Use, suggestion: String) -> FileTask {
         let (sender, receiver) = channel();
         self.asked = Some((of, receiver));
-        FileTask {
-            words,
-            suggestion,
-            purpose: Purpose::Choose(sender),
-        }
+        FileTask::choose(FILES, suggestion, sender)
     }
 
     /// Opens files: recordings are added to those that are open; a recipe, a network or a checkpoint takes their place.
     pub fn open(&mut self, paths: Vec<PathBuf>) {
-        self.is_refused = false;
         let paths = Vec::from_iter(paths.iter().map(|path| absolute(path)));
         if let (Some(reopened), [path]) = (&self.missing, &paths[..]) {
             let mut missing = reopened.missing.iter();
@@ -119,7 +100,6 @@ impl RecordingEditor {
 
     /// Opens the files of `plan`, whose paths are absolute, unless they are open.
     pub fn open_plan(&mut self, plan: &Plan) {
-        self.held_out = None;
         let is_open = self.plan().is_ok_and(|open| *open == *plan);
         let missing = self.missing.as_ref().map(|missing| &missing.recorded.plan);
         if !is_open && missing != Some(plan) {
@@ -130,36 +110,40 @@ impl RecordingEditor {
         }
     }
 
-    /// Checks the recordings of the checkpoint at `path`, which could not be resumed: they may be missing.
-    pub fn look_for_recordings(&mut self, path: PathBuf) {
-        self.open(vec![path]);
-        self.is_refused = true;
-    }
-
     /// Returns true if no file is open, missing or being opened.
     pub fn is_empty(&self) -> bool {
         self.import.is_none() && self.missing.is_none() && !self.reading.is_opening()
     }
 
-    /// Closes a recording; without the last one there is no import.
-    pub(super) fn close(&mut self, number: usize) {
+    /// Closes a file; without the last recording there is no import.
+    pub(super) fn close(&mut self, path: &Path) {
         let Some(import) = &mut self.import else { return };
-        if number == 0 && !import.plan.import.append.is_empty() {
+        let plan = import.edit();
+        let recipe = &mut plan.import;
+        let is_of_test = plan.test.iter().flat_map(FileSet::files).any(|file| file == path);
+        let appended = recipe.append.iter().position(|set| set.data == path);
+        if is_of_test {
+            plan.test = None;
+        } else if recipe.positions.as_deref() == Some(path) {
+            recipe.positions = None;
+        } else if let Some(number) = appended {
+            recipe.append.remove(number);
+            import.write_meanings(true);
+        } else if recipe.data == path && !recipe.append.is_empty() {
             // The next one takes its place, with the files joined to it.
-            let recipe = &mut import.edit().import;
             let next = recipe.append.remove(0);
             recipe.data = next.data;
             for (joined, file) in recipe.join.iter_mut().zip(next.join) {
                 joined.file = file;
             }
-            return self.read_again();
-        }
-        let mut paths = import.paths();
-        paths.remove(number);
-        if paths.is_empty() {
-            self.close_all();
+            self.read_again();
         } else {
-            self.open_files(Vec::new(), paths);
+            let mut paths = import.paths();
+            paths.retain(|other| other != path);
+            match paths.is_empty() {
+                true => self.close_all(),
+                false => self.open_files(Vec::new(), paths),
+            }
         }
     }
 
@@ -208,25 +192,16 @@ impl RecordingEditor {
     /// Takes events of the threads and paths chosen, and reports the plan if it has changed.
     pub fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.take_chosen(shared.phase.is_busy(), effects);
-        if let Some(opened) = self.reading.next_opened() {
-            let is_refused = std::mem::take(&mut self.is_refused);
-            match opened {
-                // The window has said why it was refused.
-                Err(_) if is_refused => {}
-                Ok(opened) if is_refused && !matches!(opened, Opened::Missing(_)) => {}
-                Ok(opened) => {
-                    effects.push(Effect::Settle(Matter::Recording));
-                    self.take(opened, shared, effects);
-                }
-                Err(reason) => effects.push(failed(reason)),
+        let is_by_user = !self.reading.is_reopening();
+        match self.reading.next_opened() {
+            Some(Ok(opened)) => {
+                effects.push(Effect::Settle(Matter::Recording));
+                self.take(opened, is_by_user, shared, effects);
             }
-        }
-        let run = shared.run.as_ref().map(|run| run.id);
-        if run != self.run {
-            (self.run, self.shows_columns) = (run, false);
+            Some(Err(reason)) => effects.push(failed(reason)),
+            None => {}
         }
         let settings = &shared.recording.settings;
-        self.follow_method(settings);
         let plan = self.plan();
         // Training needs the processor.
         if !shared.phase.is_busy() {
@@ -247,42 +222,43 @@ impl RecordingEditor {
 
     fn take_chosen(&mut self, is_busy: bool, effects: &mut Vec<Effect>) {
         let Some((of, receiver)) = &self.asked else { return };
-        let paths = Vec::from_iter(receiver.try_iter().map(|path| absolute(&path)));
-        let (Some(path), false) = (paths.first().cloned(), is_busy) else {
+        let (Ok(path), false) = (receiver.try_recv(), is_busy) else {
             return;
         };
+        let path = absolute(&path);
         match (of.clone(), &mut self.import, &self.missing) {
-            (Use::Recording, ..) => self.open(paths),
+            (Use::Recording, ..) => self.open(vec![path]),
             (Use::Missing(missing), _, Some(reopened)) => {
                 let reopened = Reopened::clone(reopened);
                 self.take_found(reopened, missing, path);
             }
-            (Use::Test, Some(import), _) => {
-                let refused = paths.into_iter().filter_map(|path| import.add_test_file(path).err());
-                effects.extend(refused.map(failed));
-            }
-            (Use::Positions, Some(import), _) => import.edit().import.positions = Some(path),
+            (Use::Test, Some(import), _) => effects.extend(import.set_test_file(path).err().map(failed)),
             _ => {}
         }
     }
 
-    fn take(&mut self, opened: Opened, shared: &Shared, effects: &mut Vec<Effect>) {
+    /// Takes what was opened; shows the columns if the user has opened it.
+    fn take(&mut self, opened: Opened, is_by_user: bool, shared: &Shared, effects: &mut Vec<Effect>) {
         let usual = shared.recording.settings.validation_fraction();
         let holding_out = |mut import: Import| {
             import.edit().division.validation_fraction.get_or_insert(usual);
             Some(import)
         };
+        let shown = shared.run.as_ref().map(|run| run.id);
         match opened {
             Opened::Recordings(import) => {
                 let import = import.keeping(self.import.take().unwrap_or_default());
                 (self.import, self.missing) = (holding_out(import), None);
-                self.show_columns(effects);
+                self.changed.clear();
+                effects.push(Effect::ChooseSource(SourceKind::Recording));
+                self.hidden = shown;
             }
             Opened::Plan(import, reopened) => {
                 self.close_all();
                 (self.import, self.changed) = (holding_out(*import), reopened.changed);
-                if reopened.is_recipe {
-                    self.show_columns(effects);
+                if is_by_user {
+                    effects.push(Effect::ChooseSource(SourceKind::Recording));
+                    self.hidden = shown;
                 }
                 if let Some(checkpoint) = reopened.checkpoint {
                     let setup = Setup::recording(checkpoint.settings, reopened.recorded.plan);
@@ -291,9 +267,7 @@ impl RecordingEditor {
             }
             Opened::Missing(reopened) => {
                 self.close_all();
-                if let Some(checkpoint) = &reopened.checkpoint {
-                    take_settings(checkpoint.settings, effects);
-                }
+                effects.extend(reopened.checkpoint.iter().flat_map(|saved| configured(saved.settings)));
                 self.missing = Some(reopened);
             }
             Opened::Simulation(source) => {
@@ -301,8 +275,7 @@ impl RecordingEditor {
                     source: (*source).into(),
                     ..shared.draft
                 };
-                effects.push(Effect::ChooseSource(SourceKind::Array));
-                effects.push(Effect::Configure(Box::new(settings)));
+                effects.push(Effect::TakeSetup(Box::new(settings.into())));
             }
             Opened::Network(file, import) => {
                 let summary = RunSummary::of(&file);
@@ -310,10 +283,9 @@ impl RecordingEditor {
                 match import {
                     None => effects.push(Effect::TakeSetup(Box::new(file.setup()))),
                     Some(import) => {
-                        self.held_out = None;
-                        take_settings(file.settings, effects);
+                        effects.extend(configured(file.settings));
                         match import {
-                            Ok(opened) => self.take(*opened, shared, effects),
+                            Ok(opened) => self.take(*opened, is_by_user, shared, effects),
                             Err(reason) => effects.push(failed(reason)),
                         }
                     }
@@ -327,27 +299,21 @@ impl RecordingEditor {
         }
     }
 
-    /// Shows the columns of files that the user has opened.
-    fn show_columns(&mut self, effects: &mut Vec<Effect>) {
-        self.changed.clear();
-        self.shows_columns = true;
-        effects.push(Effect::ChooseSource(SourceKind::Recording));
-    }
-
-    /// Sets the share held out for validation when another method needs another share, unless the user has set it.
-    fn follow_method(&mut self, settings: &RunSettings) {
-        let fraction = settings.validation_fraction();
-        let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.reading.is_reopening();
-        if let (true, Some(import)) = (is_new, &mut self.import) {
+    /// Sets the share held out for validation if the method of the new settings of a recording needs another one.
+    pub fn follow_method(&mut self, before: &RunSettings, settings: &RunSettings) {
+        let (fraction, is_recording) = (settings.validation_fraction(), settings.simulation().is_none());
+        if let (true, Some(import)) = (
+            is_recording && fraction != before.validation_fraction(),
+            &mut self.import,
+        ) {
             import.edit().division.validation_fraction = Some(fraction);
         }
-        self.held_out = Some(fraction);
     }
 
     /// Selects one network for all rows if no column contains the row numbers.
     fn follow_row_wires(&self, settings: &RunSettings, effects: &mut Vec<Effect>) {
         if settings.source.row_model() == RowModel::Each && !self.has_row_wires() && !self.reading.is_reopening() {
-            effects.push(Effect::ConfigureRecording(Box::new(RunSettings {
+            effects.push(Effect::Configure(Box::new(RunSettings {
                 source: Source::Measured { rows: RowModel::Shared },
                 ..*settings
             })));
@@ -362,24 +328,17 @@ impl RecordingEditor {
                 "{name} is missing: find it under “Files”, or open another recording."
             ));
         }
-        match (&self.import, self.obstacle()) {
-            (None, _) => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
-            (Some(_), _) if self.reading.is_opening() => Err("Files are being opened.".to_owned()),
-            (Some(_), Some(obstacle)) => Err(obstacle),
-            (Some(import), None) => Ok(Arc::clone(&import.plan)),
+        match &self.import {
+            None => Err(RecordingDraft::NOTHING_OPEN.to_owned()),
+            Some(_) if self.reading.is_opening() => Err("Files are being opened.".to_owned()),
+            Some(import) => import.obstacle().map_or_else(|| Ok(Arc::clone(&import.plan)), Err),
         }
-    }
-
-    /// Returns the reason why there is nothing to train on yet: a text that was refused, or what the plan lacks.
-    pub(super) fn obstacle(&self) -> Option<String> {
-        let refused = self.typed.values().find_map(|(_, refusal)| refusal.clone());
-        refused.or_else(|| self.import.as_ref()?.obstacle())
     }
 
     /// Returns the numbers of inputs and targets, once there are both.
     pub fn channels(&self) -> Option<(usize, usize)> {
-        let import = self.import.as_ref()?;
-        let channels = (import.count(Meaning::Input), import.count(Meaning::Target));
+        let recipe = &self.import.as_ref()?.plan.import;
+        let channels = (recipe.inputs.len(), recipe.targets.len());
         Some(channels).filter(|channels| channels.0 > 0 && channels.1 > 0)
     }
 
@@ -398,7 +357,8 @@ impl RecordingEditor {
 
     /// Returns true if the columns take the place of the results in the middle of the view.
     pub fn is_on_show(&self, shared: &Shared) -> bool {
-        shared.source == SourceKind::Recording && (self.shows_columns || shared.shown_run().is_none())
+        let run = shared.shown_run().map(|run| run.id);
+        shared.source == SourceKind::Recording && (run.is_none() || run == self.hidden)
     }
 
     /// Returns the files of the import, which must not be overwritten.
@@ -412,9 +372,10 @@ fn failed(reason: String) -> Effect {
     Effect::Notify(Matter::Recording, Notice::Failed(reason))
 }
 
-fn take_settings(settings: RunSettings, effects: &mut Vec<Effect>) {
-    effects.push(Effect::ChooseSource(SourceKind::Recording));
-    effects.push(Effect::ConfigureRecording(Box::new(settings)));
+/// Effects that make these the settings of the next training on a recording.
+fn configured(settings: RunSettings) -> [Effect; 2] {
+    let configure = Effect::Configure(Box::new(settings));
+    [Effect::ChooseSource(SourceKind::Recording), configure]
 }
 
 fn absolute(path: &Path) -> PathBuf {

@@ -1,9 +1,12 @@
 //! The files of a recording in the form, including those that are missing or have changed since a run was saved.
 
-use std::path::PathBuf;
+use std::{iter::once, path::PathBuf};
 
 use decoupler_core::text::counted;
-use decoupler_files::export::RecipeFile;
+use decoupler_files::{
+    export::RecipeFile,
+    import::{FileSet, Plan},
+};
 use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
@@ -20,7 +23,8 @@ use crate::window::{
 pub(super) const FILES: FileWords = FileWords {
     kind: "recording",
     description: "A table of readings and targets (CSV or other text, Excel, .npy, .npz, .mat), a recipe, a network or a \
-                  checkpoint.",
+                  checkpoint. A table with the header target,x,y says where each target lies on the skin, in millimetres: \
+                  then surfaces are shown.",
     extensions: &[
         "csv",
         "txt",
@@ -36,16 +40,13 @@ pub(super) const FILES: FileWords = FileWords {
     ],
 };
 
-/// Closes an open file by its number among the files of the same use.
-type Close = fn(&mut RecordingEditor, usize);
-
 impl RecordingEditor {
     /// Shows the files of the recording, and opens and closes them.
     pub fn files_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         section_heading_ui(ui, "Files");
         self.missing_ui(ui, effects);
-        if let Some((close, number)) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
-            close(self, number);
+        if let Some(path) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
+            self.close(&path);
         }
         for name in &self.changed {
             note_ui(ui, &format!("{name} has changed since the run was saved."));
@@ -82,7 +83,7 @@ impl RecordingEditor {
             find.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Find {name}")));
             let find = find.on_hover_text("Choose the file in its new place. Its contents are checked.");
             if find.clicked() {
-                effects.push(Effect::ChooseFile(self.ask(Use::Missing(path), FILES, name)));
+                effects.push(Effect::ChooseFile(self.ask(Use::Missing(path), name)));
             }
         }
         if is_training {
@@ -92,12 +93,10 @@ impl RecordingEditor {
 
     /// Shows the numbers of channels and samples, or the error of the import.
     fn samples_line_ui(&self, ui: &mut Ui) {
-        if self.import.is_none() {
-            return;
-        }
+        let Some(import) = &self.import else { return };
         let (inputs, targets) = self.channels().unwrap_or_default();
         let channels = format!("{}, {}", counted(inputs, "input"), counted(targets, "target"));
-        match (self.obstacle(), &self.reading.state) {
+        match (import.obstacle(), &self.reading.state) {
             (Some(reason), _) => drop(note_ui(ui, &sentence(&reason))),
             (None, State::Checked(Err(reason))) => drop(note_ui(ui, &sentence(reason))),
             (None, State::Checked(Ok(checked))) => {
@@ -141,50 +140,34 @@ impl RecordingEditor {
         let text = if is_on_show { "Show results" } else { "Columns…" };
         let hint = "Shows the columns of the files and their meanings in place of the results, or the results again.";
         if ui.add(ghost_button(text)).on_hover_text(hint).clicked() {
-            self.shows_columns = !is_on_show;
+            self.hidden = shared.run.as_ref().map(|run| run.id).filter(|_| !is_on_show);
             ui.request_repaint();
         }
     }
 }
 
 /// Lists the open files. Returns the one to be closed.
-fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<(Close, usize)> {
-    let recipe = &import.plan.import;
-    let mut files: Vec<(Close, usize, PathBuf, String)> = Vec::new();
-    for (number, path) in import.paths().into_iter().enumerate() {
-        let what = if number == 0 { "" } else { ", joined" };
-        files.push((RecordingEditor::close, number, path, what.to_owned()));
-    }
-    for (number, set) in recipe.append.iter().enumerate() {
-        let close: Close = |editor, number| {
-            if let Some(import) = &mut editor.import {
-                import.close_appended(number);
-            }
-        };
-        files.push((close, number, set.data.clone(), ", appended".to_owned()));
-    }
-    for (number, (recording, test)) in import.tests().into_iter().enumerate() {
-        let of = format!(" of {}", file_name(&recording));
-        let what = format!(", for the test{}", if import.files.len() > 1 { &of } else { "" });
-        let close: Close = |editor, _| editor.import.iter_mut().for_each(|import| import.edit().test = None);
-        files.push((close, number, test, what));
-    }
-    if let Some(path) = &recipe.positions {
-        let close: Close = |editor, _| {
-            let import = editor.import.iter_mut();
-            import.for_each(|import| import.edit().import.positions = None);
-        };
-        files.push((close, 0, path.clone(), ", positions".to_owned()));
-    }
+fn open_files_ui(ui: &mut Ui, import: &Import) -> Option<PathBuf> {
+    let Plan {
+        import: recipe, test, ..
+    } = &*import.plan;
+    let joined = recipe.join.iter().map(|joined| (&joined.file, ", joined"));
+    let appended = recipe.append.iter().map(|set| (&set.data, ", appended"));
+    let of_test = test
+        .iter()
+        .flat_map(FileSet::files)
+        .map(|path| (path, ", for the test"));
+    let positions = recipe.positions.iter().map(|path| (path, ", positions"));
+    let files = once((&recipe.data, "")).chain(joined).chain(appended);
     let mut closed = None;
-    for (close_file, number, path, what) in files {
-        let name = file_name(&path);
+    for (path, what) in files.chain(of_test).chain(positions) {
+        let name = file_name(path);
         ui.horizontal(|ui| {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let close = ui.small_button("×");
                 close.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Close {name}")));
                 if close.on_hover_text("Closes this file.").clicked() {
-                    closed = Some((close_file, number));
+                    closed = Some(path.clone());
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     let text = format!("{name}{what}");

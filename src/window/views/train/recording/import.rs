@@ -1,7 +1,7 @@
 //! The import that is edited: its plan, and the inspection of its files.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     iter::once,
     ops::Range,
     path::{Path, PathBuf},
@@ -23,10 +23,8 @@ pub(super) struct Import {
     pub(super) files: Vec<InspectedFile>,
     /// Meanings that the user or a recipe gave, kept when the files are read in another way.
     chosen: BTreeMap<ColumnKey, Meaning>,
-    /// Units, likewise.
-    units: BTreeMap<ColumnKey, String>,
-    /// File and name of a variable whose rows are to be the samples, and the meaning that its columns get.
-    pub(super) wanted: Option<(usize, String, Meaning)>,
+    /// File and name of a variable whose rows are to be the samples once the files are read again.
+    pub(super) wanted: Option<(usize, String)>,
 }
 
 impl Import {
@@ -45,8 +43,6 @@ impl Import {
         for file in &import.files {
             for (column, meaning) in file.meanings.iter().enumerate() {
                 import.chosen.insert(key(file, column), *meaning);
-                let unit = import.plan.import.units.get(&file.full_name(column));
-                import.units.extend(unit.map(|unit| (key(file, column), unit.clone())));
             }
         }
         import
@@ -54,19 +50,7 @@ impl Import {
 
     /// Returns a plan with other files and roles, and everything else as in this import.
     pub(super) fn merged(&self, found: Plan) -> Plan {
-        let older = &self.plan.import;
-        let mut import = Recipe {
-            data: found.import.data,
-            join: found.import.join,
-            append: found.import.append,
-            inputs: found.import.inputs,
-            targets: found.import.targets,
-            time: found.import.time,
-            group: found.import.group,
-            row_wire: found.import.row_wire,
-            positions: found.import.positions.or_else(|| older.positions.clone()),
-            ..older.clone()
-        };
+        let (older, mut import) = (&self.plan.import, found.import);
         for joined in &mut import.join {
             if let Some(before) = older.join.iter().find(|before| before.file == joined.file) {
                 joined.limit = before.limit;
@@ -81,18 +65,29 @@ impl Import {
                 renamed.extend(names(file, |_| true).into_iter().zip(names(&now, |_| true)));
             }
         }
-        for condition in &mut import.conditions {
-            *condition = condition.clone().renamed(|name| renamed.get(name).cloned());
-        }
-        for column in import.missing.iter_mut().filter_map(|missing| missing.column.as_mut()) {
+        let conditions = older.conditions.iter().cloned();
+        let conditions = conditions.map(|condition| condition.renamed(|name| renamed.get(name).cloned()));
+        let mut missing = older.missing.clone();
+        for column in missing.iter_mut().filter_map(|missing| missing.column.as_mut()) {
             *column = renamed.get(column).unwrap_or(column).clone();
         }
-        let columns = self.files.iter().flat_map(|file| names(file, |_| true));
-        columns.for_each(|name| drop(import.units.remove(&name)));
+        let units = older.units.iter();
+        let units = units.filter_map(|(name, unit)| Some((renamed.get(name)?.clone(), unit.clone())));
         let paths = Vec::from_iter(paths_and_stems(&import).map(|(path, _)| path.to_owned()));
         let test = self.plan.test.as_ref().and_then(|test| self.matching(test, &paths));
         Plan {
-            import,
+            import: Recipe {
+                conditions: conditions.collect(),
+                missing,
+                units: units.collect(),
+                dialect: older.dialect,
+                derive: older.derive.clone(),
+                memory: older.memory.clone(),
+                skip_damaged: older.skip_damaged,
+                truncate: older.truncate,
+                positions: import.positions.or_else(|| older.positions.clone()),
+                ..import
+            },
             test: found.test.or(test),
             division: self.plan.division,
         }
@@ -101,33 +96,25 @@ impl Import {
     /// Returns this suggestion with the choices in an `older` import, as far as they fit the files.
     pub(super) fn keeping(mut self, older: Self) -> Self {
         self.plan = Arc::new(older.merged(Arc::unwrap_or_clone(self.plan)));
-        (self.chosen, self.units) = (older.chosen, older.units);
+        self.chosen = older.chosen;
+        let mut found = BTreeSet::new();
         for file in 0..self.files.len() {
+            found.extend(names(&self.files[file], |_| true));
             for column in 0..self.files[file].columns.len() {
-                let key = key(&self.files[file], column);
-                if let Some(&meaning) = self.chosen.get(&key) {
+                if let Some(&meaning) = self.chosen.get(&key(&self.files[file], column)) {
                     self.give(file, column, meaning);
-                }
-                if let Some(unit) = self.units.get(&key).cloned() {
-                    self.set_unit(file, column, &unit);
                 }
             }
         }
+        self.edit().import.units.retain(|name, _| found.contains(name));
         self.write_meanings(older.plan.import.has_groups());
-        if let Some((file, name, meaning)) = older.wanted
-            && let mut variables = self.files.get(file).into_iter().flat_map(|file| &file.variables)
-            && let Some(variable) = variables.find(|variable| variable.name == name)
-        {
-            let columns = variable.columns.clone();
-            self.set_meanings(file, columns, meaning);
-        }
         self
     }
 
     /// Full names of the columns in use; in the file with a variable that is wanted, only that.
     pub(super) fn used(&self) -> Vec<String> {
         let of_file = |(number, file): (usize, &InspectedFile)| match &self.wanted {
-            Some((of_file, name, _)) if *of_file == number => {
+            Some((of_file, name)) if *of_file == number => {
                 let stem = file.stem.iter().chain([name]);
                 vec![Vec::from_iter(stem.map(String::as_str)).join(".")]
             }
@@ -200,7 +187,7 @@ impl Import {
     }
 
     /// Writes the meanings of the columns into the plan. The samples are divided by group if there are groups now.
-    fn write_meanings(&mut self, had_groups: bool) {
+    pub(super) fn write_meanings(&mut self, had_groups: bool) {
         let of = |meaning| {
             let named = self.files.iter().flat_map(|file| names(file, |other| other == meaning));
             Vec::from_iter(named)
@@ -221,30 +208,21 @@ impl Import {
         }
     }
 
-    /// Returns the number of columns of this meaning.
-    pub(super) fn count(&self, meaning: Meaning) -> usize {
-        let meanings = self.files.iter().flat_map(|file| &file.meanings);
-        meanings.filter(|other| **other == meaning).count()
-    }
-
     /// Returns the unit of a column, as given or in the header.
-    pub(super) fn unit(&self, file: usize, column: usize) -> String {
-        let given = self.units.get(&key(&self.files[file], column));
-        let found = self.files[file].columns[column].unit.as_ref();
-        given.or(found).cloned().unwrap_or_default()
+    pub(super) fn unit(&self, file: usize, column: usize) -> &str {
+        let file = &self.files[file];
+        let given = self.plan.import.units.get(&file.full_name(column));
+        given.or(file.columns[column].unit.as_ref()).map_or("", String::as_str)
     }
 
     /// Gives a column a unit; none if it is empty or that of the header.
-    pub(super) fn set_unit(&mut self, file: usize, column: usize, unit: &str) {
+    pub(super) fn set_unit(&mut self, file: usize, column: usize, unit: String) {
         let file = &self.files[file];
-        let (key, name, unit) = (key(file, column), file.full_name(column), unit.trim());
-        let is_given = !unit.is_empty() && file.columns[column].unit.as_deref() != Some(unit);
-        self.edit().import.units.remove(&name);
-        self.units.remove(&key);
-        if is_given {
-            self.edit().import.units.insert(name, unit.to_owned());
-            self.units.insert(key, unit.to_owned());
-        }
+        let (name, of_header) = (file.full_name(column), file.columns[column].unit.as_ref());
+        let is_given = !unit.is_empty() && of_header != Some(&unit);
+        let units = &mut self.edit().import.units;
+        units.remove(&name);
+        units.extend(is_given.then_some((name, unit)));
     }
 
     /// Returns the paths of the first recording and of those joined to it.
@@ -254,60 +232,29 @@ impl Import {
             .collect()
     }
 
-    /// Returns the files for the test that are given, each with the recording that it replaces.
-    pub(super) fn tests(&self) -> Vec<(PathBuf, PathBuf)> {
-        let tests = self.plan.test.iter().flat_map(FileSet::files);
-        self.paths().into_iter().zip(tests.cloned()).collect()
-    }
-
-    /// Adds a file of test samples for the first recording that has none. With a single recording its test file is replaced.
+    /// Takes a file of test samples in the place of the last one.
     ///
     /// # Errors
-    /// If it cannot be one; the message says what to do.
-    pub(super) fn add_test_file(&mut self, path: PathBuf) -> Result<(), String> {
-        let (name, recordings, given) = (file_name(&path), self.paths(), self.tests().len());
-        let count = recordings.len();
-        if count > 1 && given == count {
+    /// If it is trained on; the message says what to do.
+    pub(super) fn set_test_file(&mut self, path: PathBuf) -> Result<(), String> {
+        if self.plan.import.data_files().any(|trained| *trained == path) {
             return Err(format!(
-                "{name} was not opened: each of the {count} recordings already has a file for the test. To use others, close \
-                 those files first."
+                "{} is trained on, so it cannot be a test file: choose a separate recording for the test.",
+                file_name(&path)
             ));
         }
-        // The same file may be joined to both: its times distinguish its rows.
-        let is_first = given == 0 || count == 1;
-        if is_first && recordings[0] == path {
-            return Err(format!(
-                "{name} is trained on, so it cannot be a test file: choose a separate recording for the test."
-            ));
-        }
-        let test = self.edit().test.get_or_insert_default();
-        if is_first {
-            test.data = path;
-        } else {
-            test.join.push(path);
-        }
+        self.edit().test = Some(FileSet {
+            data: path,
+            ..FileSet::default()
+        });
         Ok(())
-    }
-
-    /// Closes one of the files whose rows follow those of the first, with the files joined to it.
-    pub(super) fn close_appended(&mut self, number: usize) {
-        self.edit().import.append.remove(number);
-        self.write_meanings(true);
     }
 
     /// Returns the reason why there is nothing to train on yet, with what to do.
     pub(super) fn obstacle(&self) -> Option<String> {
-        if self.plan.test.is_some()
-            && let Some(recording) = self.paths().get(self.tests().len())
-        {
-            return Some(format!(
-                "{} has no file for the test yet: choose it with “Test file…” under “Samples”, or close the other files of \
-                 the test.",
-                file_name(recording)
-            ));
-        }
-        let needed = [(Meaning::Input, "an input"), (Meaning::Target, "a target")];
-        let lacking = needed.into_iter().find(|(meaning, _)| self.count(*meaning) == 0);
+        let Recipe { inputs, targets, .. } = &self.plan.import;
+        let needed = [(inputs, "an input"), (targets, "a target")];
+        let lacking = needed.into_iter().find(|(columns, _)| columns.is_empty());
         lacking.map(|(_, what)| format!("No column is {what}: choose one in the table of columns."))
     }
 }

@@ -96,7 +96,11 @@ pub(super) fn open_files(
     let mut plan = Plan::default();
     let mut in_order = paths.iter().cloned();
     plan.import.data = in_order.next().unwrap_or_default();
-    plan.import.join = in_order.map(joined).collect();
+    let joined = in_order.map(|file| Joined {
+        file,
+        ..Joined::default()
+    });
+    plan.import.join = joined.collect();
     let inspected = inspect(&plan)?;
     plan = if has_new {
         suggested_plan(&inspected)
@@ -111,21 +115,10 @@ pub(super) fn open_files(
     Ok(Opened::Recordings(Box::new(Import::suggested(plan, inspected))))
 }
 
-fn joined(file: PathBuf) -> Joined {
-    Joined {
-        file,
-        ..Joined::default()
-    }
-}
-
 fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Opened, String> {
     match kind {
         DocumentKind::Recipe => match RecipeFile::load(path).map_err(|error| error.to_string())? {
-            RecipeFile::Recording(plan) => {
-                let mut reopened = Reopened::from(plan.absolute());
-                reopened.is_recipe = true;
-                reopen(reopened, watch)
-            }
+            RecipeFile::Recording(plan) => reopen(Reopened::from(plan.absolute()), watch),
             RecipeFile::Simulated(simulation) => Ok(Opened::Simulation(Box::new(simulation))),
         },
         DocumentKind::Network => {
@@ -178,14 +171,12 @@ pub(super) fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened,
 }
 
 /// A plan whose files are to be opened again, and what is known of them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Reopened {
     /// Plan with absolute paths, and checksums; an empty checksum is not known.
     pub(super) recorded: Recorded,
     /// Training to be resumed once all files are found.
     pub(super) checkpoint: Option<Box<CheckpointFile>>,
-    /// True if the user has opened a recipe.
-    pub(super) is_recipe: bool,
     /// Files that no longer exist.
     pub(super) missing: Vec<PathBuf>,
     /// Names of files whose contents differ from those at the time of the run.
@@ -196,10 +187,7 @@ impl From<Recorded> for Reopened {
     fn from(recorded: Recorded) -> Self {
         Self {
             recorded,
-            checkpoint: None,
-            is_recipe: false,
-            missing: Vec::new(),
-            changed: Vec::new(),
+            ..Self::default()
         }
     }
 }
@@ -209,15 +197,12 @@ impl From<Plan> for Reopened {
     fn from(plan: Plan) -> Self {
         let unknown = |path| FileChecksum {
             path,
-            crc32: String::new(),
+            ..FileChecksum::default()
         };
         Self::from(Recorded {
             files: plan.files().into_iter().map(unknown).collect(),
-            samples_crc32: String::new(),
-            search: None,
-            combined: None,
-            chosen_intervals: None,
             plan,
+            ..Recorded::default()
         })
     }
 }

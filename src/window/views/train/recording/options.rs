@@ -9,16 +9,15 @@ use decoupler_core::{
     text::Named,
 };
 use decoupler_files::import::{Condition, Decimal, Encoding, Plan, Separator};
-use eframe::egui::{Id, Response, TextEdit, Ui};
+use eframe::egui::{Id, TextEdit, Ui};
 
 use super::{
     editor::{RecordingEditor, Use},
-    files_section::FILES,
     import::{Import, file_name},
 };
 use crate::window::{
     glossary,
-    shared::{Effect, FileWords, Shared},
+    shared::{Effect, Shared},
     widgets::{
         dim_ui,
         fields::{input_text, list_ui, options_ui, percent_ui, seed_ui},
@@ -129,27 +128,21 @@ const FORMAT: [ImportOption; 5] = [
         name: "Separator",
         hint: "Separator of the cells; space stands for any number of spaces or tabs.",
         field: Field::OneOf(names::<Separator>),
-        get: |plan| name(plan.import.dialect.separator),
+        get: |plan| shown(plan.import.dialect.separator),
         set: |plan, text| named(text).map(|separator| plan.import.dialect.separator = separator),
     },
     ImportOption {
         name: "Decimal",
         hint: "Decimal separator: 1.5 or 1,5.",
         field: Field::OneOf(names::<Decimal>),
-        get: |plan| name(plan.import.dialect.decimal),
+        get: |plan| shown(plan.import.dialect.decimal),
         set: |plan, text| named(text).map(|decimal| plan.import.dialect.decimal = decimal),
     },
     ImportOption {
         name: "Header",
         hint: "Whether the first row has the names of the columns. Without them, columns are called c1, c2, …",
         field: Field::OneOf(|| vec![YES, NO]),
-        get: |plan| {
-            plan.import
-                .dialect
-                .header
-                .map_or("", |header| if header { YES } else { NO })
-                .to_owned()
-        },
+        get: |plan| shown(plan.import.dialect.header.map(|header| if header { YES } else { NO })),
         set: |plan, text| {
             plan.import.dialect.header = given(text).map(|text| text == YES);
             Ok(())
@@ -159,19 +152,14 @@ const FORMAT: [ImportOption; 5] = [
         name: "Encoding",
         hint: "Encoding of the text.",
         field: Field::OneOf(names::<Encoding>),
-        get: |plan| name(plan.import.dialect.encoding),
+        get: |plan| shown(plan.import.dialect.encoding),
         set: |plan, text| named(text).map(|encoding| plan.import.dialect.encoding = encoding),
     },
     ImportOption {
         name: "Lines before",
         hint: "Number of lines to skip before the table.",
         field: Field::Text(DETECTED),
-        get: |plan| {
-            plan.import
-                .dialect
-                .skip_lines
-                .map_or_else(String::new, |lines| lines.to_string())
-        },
+        get: |plan| shown(plan.import.dialect.skip_lines),
         set: |plan, text| {
             let lines = number(text, "a whole number", |_| true)?;
             plan.import.dialect.skip_lines = lines.filter(|lines| *lines > 0);
@@ -225,36 +213,28 @@ fn names<T: Named>() -> Vec<&'static str> {
     T::ALL.iter().map(|one| one.name()).collect()
 }
 
-fn name<T: Named>(one: Option<T>) -> String {
-    one.map_or("", Named::name).to_owned()
+/// Text of what is given, if anything is.
+fn shown<T: ToString>(one: Option<T>) -> String {
+    one.as_ref().map_or_else(String::new, T::to_string)
 }
 
 fn named<T: Named>(text: &str) -> Result<Option<T>, String> {
     given(text).map(T::parse).transpose().map_err(|error| error.to_string())
 }
 
-const POSITIONS: FileWords = FileWords {
-    kind: "file of positions",
-    description: "A table of text with the header target,x,y: the name of each target, and where it lies on the skin in \
-                  millimetres.",
-    extensions: &["csv", "txt", "tsv"],
-};
-const TEST_FILES: FileWords = FileWords {
-    kind: "recording for the test",
-    description: "A recording with the same columns; all its samples are test samples.",
-    ..FILES
-};
-
 impl RecordingEditor {
     /// Shows the folded parts of the import; changes the seed of `settings`.
     pub fn folds_ui(&mut self, ui: &mut Ui, settings: &mut RunSettings, shared: &Shared, effects: &mut Vec<Effect>) {
         let Some(import) = &self.import else { return };
         let (plan, formats) = (Arc::clone(&import.plan), import.text_formats());
+        let is_joined = !plan.import.join.is_empty();
         fold_ui(ui, "Samples", &samples_summary(import, settings), |ui| {
             self.split_ui(ui, settings.validation_fraction());
-            let button = ui.add(ghost_button("Test file…")).on_hover_text(TEST_FILES.description);
-            if button.clicked() {
-                effects.push(Effect::ChooseFile(self.ask(Use::Test, TEST_FILES, String::new())));
+            let hint = "A recording with the same columns; all its samples are test samples. Files for the test that are \
+                        joined have “test” in their names: open all of them at once.";
+            let button = ui.add_enabled(!is_joined, ghost_button("Test file…"));
+            if button.on_hover_text(hint).on_disabled_hover_text(hint).clicked() {
+                effects.push(Effect::ChooseFile(self.ask(Use::Test, String::new())));
             }
             seed_ui(ui, "Seed", glossary::SEED.hint, &mut settings.seed.0, 0);
         });
@@ -272,37 +252,11 @@ impl RecordingEditor {
             .unwrap_or(if is_automatic { "automatic" } else { "none" });
         let notes = [
             "Sensors with hysteresis, creep or drift: the inputs of the network also contain what the readings were before, \
-             within a group and across no gap in time.",
-            "Chosen automatically while these fields are empty; what is given here is kept.",
+             within a group and across no gap in time. Chosen with the other settings unless it is given here.",
         ];
-        self.part_ui(
-            ui,
-            "History of readings",
-            usual,
-            &notes[..1 + usize::from(is_automatic)],
-            &HISTORY,
-        );
-        let positions = plan.import.positions.as_ref().map(|path| file_name(path));
-        fold_ui(ui, "Positions", positions.as_deref().unwrap_or("none"), |ui| {
-            dim_ui(
-                ui,
-                "Targets that are deformations or forces at places of the skin, such as taxels: with their positions the \
-                 actual and the decoded surface of each test sample are shown. The file has the header target,x,y, in \
-                 millimetres.",
-            );
-            let button = ui
-                .add(ghost_button("Positions file…"))
-                .on_hover_text(POSITIONS.description);
-            if button.clicked() {
-                effects.push(Effect::ChooseFile(self.ask(Use::Positions, POSITIONS, String::new())));
-            }
-        });
-        let by_number =
-            "Rows belong together by their number. To join by time, make a column of each file “time” in the table.";
-        match plan.import.time {
-            _ if plan.import.join.is_empty() => {}
-            Some(_) => self.part_ui(ui, "Joined files", "by time", &[], &JOINS),
-            None => self.part_ui(ui, "Joined files", "row by row", &[by_number], &[]),
+        self.part_ui(ui, "History of readings", usual, &notes, &HISTORY);
+        if is_joined && plan.import.time.is_some() {
+            self.part_ui(ui, "Joined files", "by time", &[], &JOINS);
         }
         if !formats.is_empty() {
             let notes = Vec::from_iter(formats.iter().map(String::as_str));
@@ -367,9 +321,8 @@ impl RecordingEditor {
         if edit.changed() {
             self.typed.insert(name, (text.clone(), None));
         }
-        match refusal {
-            Some(reason) if !edit.has_focus() => drop(note_ui(ui, &reason)),
-            _ => {}
+        if let Some(reason) = refusal.filter(|_| !edit.has_focus()) {
+            note_ui(ui, &reason);
         }
         (is_untried && !edit.has_focus()).then_some(text)
     }
@@ -397,7 +350,8 @@ impl RecordingEditor {
         let has_group = import.plan.import.has_groups();
         let offered = SplitBy::ALL.iter().filter(|by| has_group || **by != SplitBy::Group);
         let offered = Vec::from_iter(offered.map(|&by| (by, by.name(), bias(by))));
-        let hint = "Rule by which samples are divided into training, validation and test.";
+        let hint = "Rule by which samples are divided into training, validation and test. To split by group, make a column \
+                    “group” in the table.";
         division.by = options_ui(ui, "Split by", hint, &offered, division.by).unwrap_or(division.by);
         if import.plan.test.is_some() {
             let text = "All samples of the test files are test samples; close these files to hold out a share instead.";
@@ -405,12 +359,7 @@ impl RecordingEditor {
         } else {
             let hint = "Share of the samples held out for testing.";
             percent_ui(ui, "Test share", hint, &mut division.test_fraction, 0.2, 1.0..=90.0);
-            let is_random = division.by == SplitBy::Random;
-            let bias_ui: fn(&mut Ui, &str) -> Response = if is_random { note_ui } else { dim_ui };
-            bias_ui(ui, bias(division.by));
-            if !has_group {
-                dim_ui(ui, "To split by group, make a column “group” in the table.");
-            }
+            dim_ui(ui, bias(division.by));
         }
         let hint = "Share of the other samples that selects the best weights and ends the training. Bayesian \
                     regularisation needs none.";
@@ -428,8 +377,8 @@ impl RecordingEditor {
 fn samples_summary(import: &Import, settings: &RunSettings) -> String {
     let division = import.plan.division;
     let share = input_text((1000.0 * division.test_fraction).round() / 10.0);
-    let split = match import.tests().first() {
-        Some((_, test)) => format!("test: {}", file_name(test)),
+    let split = match &import.plan.test {
+        Some(test) => format!("test: {}", file_name(&test.data)),
         None => format!("{}, {share} % test", division.by),
     };
     format!("{split}, seed {}", settings.seed.0)

@@ -2,7 +2,7 @@
 
 use eframe::egui::{RichText, Sense, Ui};
 
-use super::{checking::Checked, editor::RecordingEditor, reading::State};
+use super::{checking::Checked, editor::RecordingEditor};
 use crate::window::{
     shared::{Effect, Shared, sentence},
     theme::{semibold, space, type_size},
@@ -33,19 +33,14 @@ impl RecordingEditor {
                 section_heading_ui(ui, "Columns");
                 self.columns_table_ui(ui, shared.phase.is_busy());
             });
-            card_ui(ui, samples, |ui| scrolled_ui(ui, "samples", |ui| self.samples_ui(ui)));
+            card_ui(ui, samples, |ui| {
+                scrolled_ui(ui, "samples", |ui| {
+                    section_heading_ui(ui, "Samples");
+                    self.reading.checked().map(|checked| checked_ui(ui, checked));
+                });
+            });
         }
         ui.allocate_rect(whole, Sense::hover());
-    }
-
-    fn samples_ui(&self, ui: &mut Ui) {
-        section_heading_ui(ui, "Samples");
-        match &self.reading.state {
-            State::Checked(Ok(checked)) => checked_ui(ui, checked),
-            State::Checked(Err(reason)) => drop(dim_ui(ui, &format!("There are no samples: {}", sentence(reason)))),
-            State::Checking => drop(dim_ui(ui, "Checking the import…")),
-            State::Idle | State::Opening { .. } | State::Opened(_) => {}
-        }
     }
 }
 
