@@ -120,6 +120,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     check(&driver);
     assert!(driver.becomes_idle(), "an idle view draws nothing");
     driver.click("Open Six hidden nodes");
+    driver.wait("the run in Train", |driver| driver.shown() == "Train");
     assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));
 }
 
@@ -370,6 +371,7 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     assert!(fs::read_to_string(&picture).unwrap().contains("</svg>"));
     let name = driver.state().runs.workspace.runs[0].name.clone();
     driver.click(&format!("Open {name}"));
+    driver.wait("the run in Train", |driver| driver.shown() == "Train");
     assert_eq!(
         (driver.shown(), driver.state().settings().hidden),
         ("Train", kept[0].settings.hidden)

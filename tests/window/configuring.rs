@@ -146,7 +146,7 @@ fn typed_numbers_are_kept_within_their_limits() {
         ("Validation samples", "0"),
         ("Test samples", "40"),
         ("Epochs", "77"),
-        ("Seed", "9007199254740992"),
+        ("Seed", "9007199254740991"),
         ("Largest compression", "12.5"),
         ("Mu", "1e-4"),
     ] {
@@ -168,7 +168,7 @@ fn typed_numbers_are_kept_within_their_limits() {
             draft.training.stopping.epochs,
             draft.seed.0
         ),
-        (40, 77, 1 << 53)
+        (40, 77, (1 << 53) - 1)
     );
     assert_eq!(draft.simulation().unwrap().scene.largest_compression, 0.125);
     let Method::LevenbergMarquardt(settings) = draft.training.method else {
@@ -330,5 +330,5 @@ fn the_train_view_has_few_controls() {
     driver.settle();
     let folded = count(&mut driver) - visible;
     println!("{visible} controls are visible, {folded} folded");
-    assert!(visible <= 48 && folded <= 34, "{visible} visible, {folded} folded");
+    assert!(visible <= 42 && folded <= 44, "{visible} visible, {folded} folded");
 }

@@ -31,6 +31,7 @@ mod reading_errors;
 mod recordings;
 mod remembering;
 mod results;
+mod same_networks;
 mod scenes;
 mod scrubbing;
 mod sensor;
@@ -47,3 +48,5 @@ mod folders;
 #[cfg(target_os = "linux")]
 #[path = "../support/faults.rs"]
 mod preloaded;
+#[path = "../support/terminal.rs"]
+mod terminal;

@@ -19,7 +19,6 @@ use decoupler_core::{
     evaluation::{RUN_OPTIONS, RunSettings, TrainingSize},
     scene::RowModel,
     settings::{Field, Kind, Setting, Value},
-    text::counted,
 };
 use eframe::egui::{Align, Align2, TextEdit, Ui, vec2};
 
@@ -122,13 +121,9 @@ pub fn advanced_ui(
     has_recorded_rows: bool,
     size: Option<TrainingSize>,
 ) {
-    let summary = |settings: &RunSettings| {
-        let epochs = counted(settings.training.stopping.epochs, "epoch");
-        format!("{}, {epochs}", network::of_inputs(settings))
-    };
     let summary = match fields.set_by {
-        SetBy::User => summary(fields.settings),
-        SetBy::Choice(chosen) => chosen.map_or_else(|| AUTOMATIC.to_owned(), summary),
+        SetBy::User => network::of_inputs(fields.settings),
+        SetBy::Choice(chosen) => chosen.map_or_else(|| AUTOMATIC.to_owned(), network::of_inputs),
     };
     fold_ui(ui, "Advanced", &summary, |ui| {
         ui.add_enabled_ui(is_new, |ui| {

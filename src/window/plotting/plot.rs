@@ -3,7 +3,7 @@
 
 use decoupler_files::figure::{Form, Ink, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Scale, Series};
 use eframe::egui::{
-    Color32, FontId, Id, Label, Painter, Popup, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, TextWrapMode,
+    Align, Color32, FontId, Id, Label, Layout, Painter, Popup, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke,
     Ui, UiBuilder, Vec2, WidgetInfo, accesskit::Role,
 };
 use egui_plot::{
@@ -96,6 +96,10 @@ const NOTES_WIDTH: f32 = space(48);
 /// else above.
 pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnPlot<'a>> {
     let head_ui = |ui: &mut Ui| {
+        // A low card is for the curves; their names are under the pointer.
+        if ui.available_height() < space(30) {
+            return;
+        }
         legend_ui(ui, figure);
         for note in &figure.notes {
             dim_ui(ui, note);
@@ -180,22 +184,14 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
         ui.spacing_mut().item_spacing.x = space(1);
         for (name, look) in keys {
             // A line and its name stay together.
-            let width = 1.2 * measure(ui.painter(), name).x + space(7);
-            let whole = width <= ui.max_rect().width();
-            if ui.available_size_before_wrap().x < width {
-                ui.end_row();
-            }
-            let (place, _) = ui.allocate_exact_size(Vec2::splat(space(4)), Sense::hover());
-            paint(
-                ui.painter(),
-                palette,
-                &look.sample(to_glam(place.left_center()), place.width()),
-            );
-            let name = Label::new(RichText::new(name).size(type_size().note).color(palette.dim));
-            ui.add(name.wrap_mode(match whole {
-                true => TextWrapMode::Extend,
-                false => TextWrapMode::Truncate,
-            }));
+            let width = (1.2 * measure(ui.painter(), name).x + space(7)).min(ui.max_rect().width());
+            let entry = Layout::left_to_right(Align::Center);
+            ui.allocate_ui_with_layout(Vec2::new(width, space(5)), entry, |ui| {
+                let (place, _) = ui.allocate_exact_size(Vec2::splat(space(4)), Sense::hover());
+                let sample = look.sample(to_glam(place.left_center()), place.width());
+                paint(ui.painter(), palette, &sample);
+                ui.add(Label::new(RichText::new(name).size(type_size().note).color(palette.dim)).truncate());
+            });
             ui.add_space(space(2));
         }
     });

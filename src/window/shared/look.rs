@@ -9,7 +9,8 @@ use decoupler_files::{
     },
 };
 use eframe::egui::{
-    Align, Button, ComboBox, CursorIcon, Label, Layout, Popup, Rect, RichText, Sense, Ui, UiBuilder, vec2,
+    Align, Button, ComboBox, CursorIcon, Label, Layout, Popup, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, Vec2,
+    vec2,
 };
 
 use super::Effect;
@@ -80,6 +81,27 @@ pub fn view_mode_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
     let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
     let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
     effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+}
+
+/// Divides the middle of a view: surfaces above, a chart below at the left, and figures at its right. In a small window it
+/// scrolls.
+pub fn surfaces_above_ui(ui: &mut Ui, contents_ui: impl FnOnce(&mut Ui, [Rect; 3])) {
+    /// Size below which it scrolls.
+    const MIN_SIZE: Vec2 = vec2(space(160), space(120));
+    let (gap, size) = (space(2), ui.available_size().max(MIN_SIZE));
+    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+        let (whole, _) = ui.allocate_exact_size(size, Sense::hover());
+        let lower_height = (0.43 * whole.height()).clamp(space(56), space(100));
+        let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+        let figures_width = (0.42 * whole.width()).clamp(space(80), space(120));
+        let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
+        let places = [
+            upper.with_max_y(upper.max.y - gap),
+            left.with_max_x(left.max.x - gap),
+            right,
+        ];
+        contents_ui(ui, places);
+    });
 }
 
 /// Cards of the same width side by side in `rect`, with the colour scales of `figure` at the right of the last one;

@@ -20,7 +20,9 @@ pub use export::{
     ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, ToCopy, file_stem,
     saying_saved,
 };
-pub use look::{Look, RightCard, card_head_ui, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui};
+pub use look::{
+    Look, RightCard, card_head_ui, surface_cards_ui, surface_ui, surfaces_above_ui, target_choice_ui, view_mode_ui,
+};
 pub use offers::{FileInUse, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
 pub use run_view::{run_buttons_ui, sentence, training_status};

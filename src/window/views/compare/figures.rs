@@ -47,8 +47,12 @@ fn figures(file: &NetworkFile) -> Vec<(String, Cell)> {
     match &scores.network {
         TestErrors::Nodes(errors) => {
             add("Z error, %", errors.z_percent.into());
-            add("X error, %", errors.x_percent.into());
-            add("Y error, %", errors.y_percent.into());
+            // A coordinate that does not vary has no error.
+            for (name, percent) in [("X error, %", errors.x_percent), ("Y error, %", errors.y_percent)] {
+                if percent.is_some_and(|percent| percent != 0.0) {
+                    add(name, percent.into());
+                }
+            }
             add("Z error, mm", errors.z_mm.into());
             add("Z error, % of the stroke", errors.z_full_scale_percent.into());
             add("worst node, mm", errors.worst_mm.into());

@@ -7,7 +7,7 @@ mod side;
 use std::sync::Arc;
 
 use decoupler_files::figure::{Figure, PlotFigure, compared_losses_figure, surface::SurfaceFigure};
-use eframe::egui::{Align, Label, Layout, RichText, Sense, Ui};
+use eframe::egui::{Align, Label, Layout, RichText, Ui};
 
 use self::{
     figures::{compared_table, figures_ui},
@@ -19,7 +19,7 @@ use crate::window::{
     plotting::{plots_ui, titled_plots_ui},
     shared::{
         Effect, NetworkSource, PLACES, RightCard, RunList, RunsRequest, Shared, Shown, Status, View, surface_cards_ui,
-        surface_ui, target_choice_ui, view_mode_ui,
+        surface_ui, surfaces_above_ui, target_choice_ui, view_mode_ui,
     },
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
@@ -69,38 +69,30 @@ impl View for CompareView {
     /// Shows the surfaces of both runs above, their curves and figures below.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         self.fill_sides(&shared.runs, effects);
-        let whole = ui.available_rect_before_wrap();
-        let gap = space(2);
-        let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));
-        let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-        let upper = upper.with_max_y(upper.max.y - gap);
-        let (figure, look) = (self.figure(shared), shared.look);
-        surface_cards_ui(
-            ui,
-            (upper, PLACES.len()),
-            &figure,
-            look,
-            effects,
-            |ui, place, effects| {
-                self.head_ui(ui, shared, place, effects);
-                self.side_ui(ui, shared, place, &figure, effects);
-            },
-        );
-        let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
-        let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-        card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
-            match &losses(&shared.runs) {
+        surfaces_above_ui(ui, |ui, [upper, left, right]| {
+            let (figure, look) = (self.figure(shared), shared.look);
+            surface_cards_ui(
+                ui,
+                (upper, PLACES.len()),
+                &figure,
+                look,
+                effects,
+                |ui, place, effects| {
+                    self.head_ui(ui, shared, place, effects);
+                    self.side_ui(ui, shared, place, &figure, effects);
+                },
+            );
+            card_ui(ui, left, |ui| match &losses(&shared.runs) {
                 Some(losses) => titled_plots_ui(ui, "Loss", losses),
                 None => placeholder_ui(ui, "The errors of each epoch of both runs appear here, in one chart."),
-            }
-        });
-        card_ui(ui, right, |ui| {
-            scrolled_ui(ui, "compared figures", |ui| {
-                section_heading_ui(ui, "Errors on the test sets");
-                figures_ui(ui, &shared.runs);
+            });
+            card_ui(ui, right, |ui| {
+                scrolled_ui(ui, "compared figures", |ui| {
+                    section_heading_ui(ui, "Errors on the test sets");
+                    figures_ui(ui, &shared.runs);
+                });
             });
         });
-        ui.allocate_rect(whole, Sense::hover());
         None
     }
 }

@@ -14,7 +14,9 @@ use eframe::egui::{Align, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo}
 use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
     plotting::{SeriesView, cells_ui},
-    shared::{Command, Effect, Look, Shared, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui},
+    shared::{
+        Command, Effect, Look, Shared, card_head_ui, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui,
+    },
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
@@ -49,7 +51,7 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         (upper.with_max_y(upper.bottom() - gap), lower)
     };
     let beside = |rect: Rect| {
-        let width = (0.42 * rect.width()).clamp(space(75), space(110));
+        let width = (0.32 * rect.width()).clamp(space(75), space(100));
         let (left, right) = rect.split_left_right_at_x(rect.right() - width);
         (left.with_max_x(left.right() - gap), right)
     };
@@ -138,12 +140,9 @@ fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, look: Look, effects
     let cards = (rect, figure.surfaces.len());
     surface_cards_ui(ui, cards, &figure, look, effects, |ui, index, effects| {
         let surface = &figure.surfaces[index];
-        ui.horizontal(|ui| {
-            ui.set_min_height(space(7));
-            ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
+        card_head_ui(ui, &surface.title, |ui| {
             if index == 0 {
-                let at_right = Layout::right_to_left(Align::Center);
-                ui.with_layout(at_right, |ui| view_mode_ui(ui, look, effects));
+                view_mode_ui(ui, look, effects);
             }
         });
         let view = SurfaceView {
@@ -204,10 +203,7 @@ fn invitation(view: &LiveView, shared: &Shared) -> String {
 
 /// Shows the readings of an array as a map of rows and columns, with the faulty wires marked.
 fn readings_ui(ui: &mut Ui, readings: &HeatMap, [rows, columns]: &[Vec<usize>; 2]) {
-    ui.horizontal(|ui| {
-        ui.set_min_height(space(7));
-        ui.label(RichText::new("Readings").font(semibold(type_size().title)));
-    });
+    card_head_ui(ui, "Readings", |_| ());
     let marks = (&**rows, &**columns, Theme::of(ui).palette.warning);
     if let Some(([row, column], cell)) = cells_ui(ui, "Live readings", readings, marks) {
         let drop_percent = format_number(readings.values[[row, column]]);
@@ -246,7 +242,7 @@ fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shar
     let quantile = |share| counts.latencies.quantile(share);
     let [median, high] = [0.5, 0.99].map(|share| quantile(share).map_or_else(|| format_number(None), format_duration));
     fact_ui(ui, "Latency", hint, &format!("median {median}, 99 % within {high}"));
-    fact_ui(ui, "Decoded", "Frames since the start.", &counts.decoded.to_string());
+    fact_ui(ui, "Decoded", "Answers so far.", &counts.decoded.to_string());
     let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
     fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
     let hint = "Malformed lines, and frames that could not be decoded.";

@@ -161,8 +161,6 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
             ];
             let kinds = if has_sensor { &kinds[..] } else { &kinds[1..] };
             let kind = view.source.kind;
-            // A network of a recording has no sensor model to simulate.
-            let kind = if has_sensor || kind != SourceKind::Simulated { kind } else { SourceKind::Replay };
             view.source.kind = segmented_ui(ui, "Source", kinds, kind, false).unwrap_or(kind);
             ui.add_space(space(1));
             view.source.fields_ui(ui);

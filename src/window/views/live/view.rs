@@ -282,19 +282,20 @@ impl LiveView {
     /// Returns the state of the stream, its network and source, and its rate.
     fn status(&self, shared: &Shared) -> Status {
         let (counts, replay) = (&self.shown.counts, &self.shown.replay);
+        let unit = if self.has_sensor(shared) { "frame" } else { "sample" };
         let Some(running) = &self.running else {
             let text = match (self.plan(shared), counts.decoded) {
                 (Err(obstacle), _) => obstacle,
                 (Ok(_), 0) => "Ready: press Start".to_owned(),
-                (Ok(_), decoded) => format!("Stopped after {}", counted(decoded, "frame")),
+                (Ok(_), decoded) => format!("Stopped after {}", counted(decoded, unit)),
             };
             return Status::new(Tone::Calm, text);
         };
         let fault = self.shown.answer.as_ref().map(|answer| &answer.fault);
         let mut status = match (fault, replay) {
             _ if self.shown.lost.is_some() => Status::new(Tone::Warning, "Connection lost: trying again"),
-            (None, _) => Status::new(Tone::Busy, "Waiting for the first frame"),
-            _ if counts.is_waiting => Status::new(Tone::Warning, "No frame for two seconds"),
+            (None, _) => Status::new(Tone::Busy, format!("Waiting for the first {unit}")),
+            _ if counts.is_waiting => Status::new(Tone::Warning, format!("No {unit} for two seconds")),
             (Some(Some((fault, _))), _) => Status::new(Tone::Warning, format!("Fault: {fault}")),
             (_, Some(replay)) if !replay.is_playing && replay.at_s >= replay.length_s => {
                 Status::new(Tone::Calm, "Replay ended: press Play to see it again")
@@ -308,7 +309,7 @@ impl LiveView {
             status = status.with_note(reason);
         }
         if counts.decoded > 0 {
-            status = status.with_note(format!("{:.0} frames per second", counts.frames_per_second));
+            status = status.with_note(format!("{:.0} {unit}s per second", counts.frames_per_second));
         }
         if let Some(recorded) = self.shown.recorded.as_ref().filter(|_| self.is_recording()) {
             let (frames, seconds) = (counted(recorded.frames, "frame"), recorded.seconds);
@@ -350,6 +351,10 @@ impl View for LiveView {
             }
             Some(Err(reason)) => effects.push(notify(Notice::Failed(reason))),
             None => {}
+        }
+        if self.source.kind == SourceKind::Simulated && !self.has_sensor(shared) {
+            // A network of a recording has no model to simulate.
+            self.source.kind = SourceKind::Replay;
         }
         let network = self.network(shared).map(|(_, file)| file);
         let decoded_by = self.shown.answer.as_ref().map(|answer| &answer.network);

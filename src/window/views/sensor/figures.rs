@@ -7,13 +7,16 @@ use decoupler_files::{
         surface::{Quantity, Surface, SurfaceFigure},
     },
 };
-use eframe::egui::{RichText, Sense, Ui};
+use eframe::egui::{RichText, Ui};
 
 use super::{Analysis, SensorView, view::RECORDED};
 use crate::window::{
     forms::meaning,
     plotting::titled_plots_ui,
-    shared::{Effect, Look, Shared, Shown, SourceKind, card_head_ui, surface_cards_ui, surface_ui, view_mode_ui},
+    shared::{
+        Effect, Look, Shared, Shown, SourceKind, card_head_ui, surface_cards_ui, surface_ui, surfaces_above_ui,
+        view_mode_ui,
+    },
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, fact_ui, fields::capitalised, note_ui, scrolled_ui, section_heading_ui, segmented_ui},
@@ -28,25 +31,20 @@ pub(super) fn analysis_ui(
     look: Look,
     effects: &mut Vec<Effect>,
 ) -> (usize, Option<usize>) {
-    let whole = ui.available_rect_before_wrap();
-    let gap = space(2);
-    let lower_height = (0.44 * whole.height()).clamp(space(60), space(100));
-    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-    let figure = surfaces_figure(view, analysis, look);
-    let cards = (upper.with_max_y(upper.max.y - gap), figure.surfaces.len());
     let mut picked = (view.axis, view.node);
-    surface_cards_ui(ui, cards, &figure, look, effects, |ui, place, effects| {
-        pattern_ui(ui, &figure, place, look, analysis, &mut picked, effects);
+    surfaces_above_ui(ui, |ui, [upper, left, right]| {
+        let figure = surfaces_figure(view, analysis, look);
+        let cards = (upper, figure.surfaces.len());
+        surface_cards_ui(ui, cards, &figure, look, effects, |ui, place, effects| {
+            pattern_ui(ui, &figure, place, look, analysis, &mut picked, effects);
+        });
+        card_ui(ui, left, |ui| {
+            titled_plots_ui(ui, "Singular values", &singular_values(analysis));
+        });
+        card_ui(ui, right, |ui| {
+            scrolled_ui(ui, "sensor facts", |ui| facts_ui(ui, analysis));
+        });
     });
-    let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
-    let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
-    card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
-        titled_plots_ui(ui, "Singular values", &singular_values(analysis));
-    });
-    card_ui(ui, right, |ui| {
-        scrolled_ui(ui, "sensor facts", |ui| facts_ui(ui, analysis));
-    });
-    ui.allocate_rect(whole, Sense::hover());
     picked
 }
 

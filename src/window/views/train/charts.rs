@@ -94,7 +94,7 @@ const HISTOGRAM: Chart = Chart {
         let (pairs, of) = pairs(view, shared)?;
         Some(histogram_figure(&pairs, of).into())
     },
-    bar_ui: lower_target_ui,
+    bar_ui: |ui, view, shared| target_bar_ui(ui, view, shared, "target of the errors"),
     ..BARE
 };
 
@@ -109,7 +109,7 @@ const REGRESSION: Chart = Chart {
         Some(figure.lighting(|_| false, lit_value(view, shared).as_slice()).into())
     },
     items: Items::Values,
-    bar_ui: target_bar_ui,
+    bar_ui: |ui, view, shared| target_bar_ui(ui, view, shared, "target of the answers"),
     ..BARE
 };
 
@@ -126,7 +126,7 @@ const HYSTERESIS: Chart = Chart {
         let found = view.result(shared)?.charts.loops.get(target)?.as_ref()?;
         Some(hysteresis_figure(found, test.problem.targets.get(target)?).into())
     },
-    bar_ui: target_bar_ui,
+    bar_ui: |ui, view, shared| target_bar_ui(ui, view, shared, "target of the answers"),
     ..BARE
 };
 
@@ -293,7 +293,7 @@ pub(super) fn answers_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: 
 fn series_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
     let targets = shared.test().map_or(0, |test| test.problem.targets.len());
     if targets > SeriesView::tracks(ui) {
-        target_bar_ui(ui, view, shared);
+        target_bar_ui(ui, view, shared, "first target");
         view.series.first = view.target;
     }
     let (Some(test), Some(result)) = (shared.test(), view.scrub.shown(shared)) else {
@@ -412,16 +412,7 @@ pub(super) fn lit_nodes(view: &TrainView, shared: &Shared) -> Vec<usize> {
 }
 
 /// The choice of the target, where there are several.
-fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
-    chosen_target_ui(ui, view, shared, "target of the answers");
-}
-
-/// The same in the card below.
-fn lower_target_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
-    chosen_target_ui(ui, view, shared, "target of the charts");
-}
-
-fn chosen_target_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, id: &str) {
+fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, id: &str) {
     if let Some(test) = shared
         .test()
         .filter(|test| test.skin.is_none() && shared.result().is_some())

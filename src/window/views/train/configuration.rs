@@ -114,7 +114,7 @@ fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
         .simulation()
         .map(|simulation| forms::of_scene(&simulation.scene));
     fold_ui(ui, "Scene", &scene.unwrap_or_default(), |ui| {
-        forms::scene_ui(ui, fields)
+        forms::scene_ui(ui, fields);
     });
     fold_ui(ui, "Samples", &forms::of_samples(fields.settings), |ui| {
         fields.show(ui, &forms::SAMPLES);
