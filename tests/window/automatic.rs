@@ -93,7 +93,7 @@ fn another_seed_is_no_setting_of_the_choice_but_another_plan_is_chosen_for_again
 fn a_given_memory_is_kept_by_the_choice() {
     let (mut driver, _path, _folder) = opened(90);
     driver.unfold_to("History of readings", "Lags");
-    assert!(driver.says("Chosen automatically while these fields are empty"));
+    assert!(driver.says("Chosen with the other settings unless it is given here"));
     driver.enter("Lags", "3");
     driver.settle();
     assert!(driver.says("lags 3"), "{:#?}", driver.texts());

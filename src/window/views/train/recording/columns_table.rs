@@ -22,7 +22,7 @@ use crate::window::{
 };
 
 const MEANING_WIDTH: f32 = space(23);
-const UNIT_WIDTH: f32 = space(13);
+const UNIT_WIDTH: f32 = space(16);
 const COLUMNS: [TableColumn<'_>; 7] = [
     TableColumn::text("column").width(ColumnWidth::Rest),
     TableColumn::text("meaning").width(ColumnWidth::Points(MEANING_WIDTH)),
@@ -164,7 +164,8 @@ fn column_row<'a>(
         0 => "–".to_owned(),
         missing => missing.to_string(),
     };
-    let remark = remark(summary, column);
+    // The values of a group may be texts.
+    let remark = remark(summary, column).filter(|_| meaning != Meaning::Group);
     let is_bad = remark.is_some() && !is_unused;
     let remark_colour = if is_bad { palette.warning } else { palette.dim };
     let row = TableRow::new([
@@ -231,7 +232,7 @@ fn range_text(min: f64, max: f64) -> String {
     let exact = [min, max].map(|end| tick_text(end, (max - min) / 100.0)).join(" – ");
     match ends {
         [end, _] if min == max => end,
-        _ if exact.chars().count() <= MAX_CHARACTERS => exact,
+        _ if max - min >= 1e-6 && exact.chars().count() <= MAX_CHARACTERS => exact,
         [one, other] if one == other => format!("{one}, width {}", format_number(max - min)),
         ends => ends.join(" – "),
     }

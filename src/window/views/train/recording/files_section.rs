@@ -124,7 +124,10 @@ impl RecordingEditor {
                 }
             } else if !self.is_empty() {
                 let clear = ui.add(ghost_button("Clear"));
-                if clear.on_hover_text("Closes all files.").clicked() {
+                if clear
+                    .on_hover_text("Closes all files. Undo opens them again.")
+                    .clicked()
+                {
                     self.close_all();
                 }
             }

@@ -345,6 +345,7 @@ impl RecordingEditor {
 
     /// The division of the samples.
     fn split_ui(&mut self, ui: &mut Ui, usual_validation: f64) {
+        let samples = self.reading.checked().map(|checked| checked.samples);
         let Some(import) = &mut self.import else { return };
         let mut division = import.plan.division;
         let has_group = import.plan.import.has_groups();
@@ -360,6 +361,13 @@ impl RecordingEditor {
             let hint = "Share of the samples held out for testing.";
             percent_ui(ui, "Test share", hint, &mut division.test_fraction, 0.2, 1.0..=90.0);
             dim_ui(ui, bias(division.by));
+            if let (SplitBy::Group, Some(samples)) = (division.by, samples) {
+                let (held_out, all) = (samples[2], samples.iter().sum::<usize>().max(1));
+                dim_ui(
+                    ui,
+                    &format!("Held out: {held_out} of {all} samples ({} %).", 100 * held_out / all),
+                );
+            }
         }
         let hint = "Share of the other samples that selects the best weights and ends the training. Bayesian \
                     regularisation needs none.";

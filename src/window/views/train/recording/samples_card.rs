@@ -36,7 +36,9 @@ impl RecordingEditor {
             card_ui(ui, samples, |ui| {
                 scrolled_ui(ui, "samples", |ui| {
                     section_heading_ui(ui, "Samples");
-                    self.reading.checked().map(|checked| checked_ui(ui, checked));
+                    if let Some(checked) = self.reading.checked() {
+                        checked_ui(ui, checked);
+                    }
                 });
             });
         }
