@@ -39,7 +39,7 @@ pub(super) fn top_bar_ui(
             let views = ViewKind::ALL.map(|view| (view, view.name()));
             segmented_ui(ui, "View", &views, shown, false)
         };
-        let form = (width < SMALL).then(|| command_button_ui(ui, offers, Command::Form, "☰"));
+        let form = (width < SMALL).then(|| command_button_ui(ui, offers, Command::Form, "»"));
         let picked = ui.scope(views_ui).inner.map(Command::Show).or(form.flatten());
         // They keep the order of reading, which the Tab key follows; their width is that of the frame before.
         let id = Id::unique("width of the tools");
