@@ -88,10 +88,10 @@ pub(crate) fn number(of: &Value, name: &str) -> f64 {
 
 /// Numbers of the column of a CSV text whose name begins like this.
 pub(crate) fn column(text: &str, name: &str) -> Vec<f64> {
-    let mut lines = text.lines();
-    let column = lines.next().unwrap().split(',').position(|cell| cell.starts_with(name));
-    let number = |line: &str| line.split(',').nth(column.unwrap()).unwrap().parse().unwrap();
-    lines.map(number).collect()
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let column = reader.headers().unwrap().iter().position(|cell| cell.starts_with(name));
+    let number = |record: Result<csv::StringRecord, _>| record.unwrap()[column.unwrap()].parse().unwrap();
+    reader.records().map(number).collect()
 }
 
 /// A running program that replaces files, with pipes to it. Signals are enabled that are ignored if the tests run in the

@@ -7,6 +7,7 @@ use tempfile::TempDir;
 use crate::{
     calls::{both, column, has, json, number, read, refused, said, success, write},
     live,
+    terminal::decoupler,
 };
 
 const TRAIN: &str = "train --data press.csv --time t --inputs u --targets force --hidden 3 --starts 1 --epochs 60 \
@@ -112,11 +113,11 @@ fn a_stream_is_decoded_like_a_file_with_derived_columns_and_a_memory() {
     assert_near(&column(&text, "force"), &of_file[21..], 1e-9);
     // A stream without one of the columns is refused with the reason.
     write(folder.path(), "other.csv", "t,v\n0,1\n");
-    refused(
-        &format!("{FOLLOW} other.csv"),
-        folder.path(),
-        1,
-        "there is no column 'd'",
+    let output = decoupler(&format!("{FOLLOW} other.csv"), folder.path());
+    assert_eq!(output.status.code(), Some(1));
+    has(
+        &String::from_utf8(output.stderr).unwrap(),
+        &["error: 'other.csv': line 1: there is no column 'd'"],
     );
 }
 
@@ -128,7 +129,7 @@ fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
     has(&read(folder.path(), "r.json"), &["\"lags\"", "\"0.5s\""]);
     let without_time = TRAIN.replace("--time t ", "");
     for (arguments, status, cause) in [
-        (format!("{without_time} --history 2s"), 1, "a memory of 2s needs times"),
+        (format!("{without_time} --history 2s"), 2, "a memory of 2s needs times"),
         (format!("{TRAIN} --history 2h"), 2, "write a number of samples as in 20"),
         (
             format!("{TRAIN} --history 0.01s"),

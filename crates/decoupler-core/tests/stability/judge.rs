@@ -70,7 +70,7 @@ fn with_cure(message: &impl Display, verdict: Verdict) -> Verdict {
     const CURES: &[&str] = &[
         "give", "must", "use ", "take", "lower", "raise", "set ", "draw", "train", "make", "check", "choose", "write",
         "copy", "fewer", "keep", "end rows", "name ", "need", "let ", "shift", "begin", "install", "resume", "change",
-        "scale ", "correct", "press ",
+        "scale ", "correct", "press ", "try ",
     ];
     let words = message.to_string().to_lowercase();
     if !CURES.iter().any(|cure| words.contains(cure)) {

@@ -351,7 +351,7 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
     let methods = Axis::names(AxisKind::Method, ["br", "lm"]);
     let splits = Axis::names(AxisKind::Split, SplitBy::ALL);
     let experiment = on_recording(&setup, methods, Some(splits));
-    let results = run_on(&[experiment.clone()], &samples_of(&setup), 2).remove(0);
+    let results = run_on(std::slice::from_ref(&experiment), &samples_of(&setup), 2).remove(0);
     assert!(results.is_complete());
     for (place, cell) in results.cells.iter().enumerate() {
         assert!(cell.failures.is_empty(), "{:?}", cell.failures);
@@ -463,7 +463,7 @@ fn tables_of_a_recording_have_its_error_measures_and_target_names() {
     let setup = recording(folder.path());
     let experiment = on_recording(&setup, Axis::integers(AxisKind::Hidden, [2, 4]), None);
     let samples = samples_of(&setup);
-    let mut results = run_on(&[experiment.clone()], &samples, 2).remove(0);
+    let mut results = run_on(std::slice::from_ref(&experiment), &samples, 2).remove(0);
     let TrialSamples::Recorded { problem, .. } = &samples else {
         panic!("the samples are recorded");
     };
