@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use decoupler::window::surface_view::SurfaceView;
-use decoupler::window::theme::{self, Theme};
+use decoupler::window::theme;
 use decoupler_core::surface::SurfaceMap;
 use decoupler_files::figure::SequentialMap;
-use decoupler_files::figure::surface::{OrbitCamera, Quantity, Surface, ViewMode};
+use decoupler_files::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
 use divan::{Bencher, black_box};
 use eframe::egui::{Context, RawInput, Rect, Vec2, pos2, vec2};
 use glam::DVec3;
@@ -69,9 +69,9 @@ fn frames(bencher: Bencher<'_, '_>, mode: ViewMode, turn: impl Fn(OrbitCamera) -
         screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), size)),
         ..RawInput::default()
     };
-    let mut camera = OrbitCamera::default();
+    let mut figure = SurfaceFigure::default();
     bencher.bench_local(|| {
-        camera = turn(camera);
+        figure.camera = turn(figure.camera);
         let mut output = ctx.run_ui(input.clone(), |ui| {
             ui.spacing_mut().item_spacing = Vec2::ZERO;
             ui.horizontal_top(|ui| {
@@ -80,12 +80,10 @@ fn frames(bencher: Bencher<'_, '_>, mode: ViewMode, turn: impl Fn(OrbitCamera) -
                         let view = SurfaceView {
                             label,
                             surface: &surface,
-                            marked_node: None,
-                            lit_nodes: &[],
-                            section: None,
-                            theme: Theme::dark(),
+                            figure: &figure,
+                            is_touched: false,
                         };
-                        view.show(ui, camera);
+                        view.show(ui);
                     });
                 }
             });

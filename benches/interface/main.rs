@@ -206,11 +206,11 @@ fn main() {
         let settings = endless(scale);
         bench.window.apply(Effect::Configure(Box::new(settings)));
         bench.wait(|state| {
-            let shown = state.test().map(|test| test.sensor.scale);
+            let shown = state.skin().map(|skin| skin.sensor.scale);
             shown.is_some() && shown == settings.simulation().map(|simulation| simulation.sensor.scale)
         });
-        let points = bench.state().test().map_or([0, 0], |test| {
-            let grid = test.map.grid();
+        let points = bench.state().skin().map_or([0, 0], |skin| {
+            let grid = skin.map.grid();
             [grid.x_mm().len(), grid.y_mm().len()]
         });
         let name = |what: &str| format!("{scale}, surfaces of {}×{}: {what}", points[0], points[1]);

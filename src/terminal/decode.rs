@@ -85,12 +85,13 @@ impl Decode {
             }
         }
         check_output("--out", out)?;
-        decode_file(&NetworkFile::load(&self.network)?, &data, out)
+        let (lines, lines_outside) = decode_file(&NetworkFile::load(&self.network)?, &data, out)?;
+        print(|| json!({"lines": lines, "lines_outside": lines_outside}), |_| Ok(()))
     }
 }
 
-/// Decodes the file `input` into the file `output`.
-fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
+/// Decodes the file `input` into the file `output`; returns the number of lines, and of those outside the training range.
+pub(crate) fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(usize, usize), Failure> {
     let refused = |source| WriteError::io(output, source);
     let mut answers = Answers::new(file, Form::Csv, AtomicFile::create(output)?);
     let mut answer = Answer::default();
@@ -128,10 +129,7 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     let outside = answers.outside;
     outside.warn();
     drift.end();
-    print(
-        || json!({"lines": outside.lines, "lines_outside": outside.outside}),
-        |_| Ok(()),
-    )
+    Ok((outside.lines, outside.outside))
 }
 
 /// Fills `values` with the answers, each followed by the half-width of its interval if the target has one.

@@ -22,7 +22,7 @@ use super::interruption;
 
 /// Reason why a command failed.
 #[derive(Debug, Error)]
-pub(super) enum Failure {
+pub(crate) enum Failure {
     #[error("{0}")]
     Arguments(String),
     #[error("{0}")]

@@ -8,16 +8,16 @@
 
 mod calibrate;
 mod cross_validation;
-mod decode;
+pub(crate) mod decode;
 mod export;
-mod failure;
+pub(crate) mod failure;
 mod file_patterns;
 mod follow;
 mod import_arguments;
 mod inspect;
 mod interruption;
 mod intervals;
-mod output;
+pub(crate) mod output;
 mod reproduce;
 mod samples;
 mod settings_arguments;

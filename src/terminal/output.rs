@@ -50,7 +50,7 @@ static IS_TAKEN: AtomicBool = AtomicBool::new(false);
 static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Forgets an earlier command of the same process, before arguments are parsed.
-pub(super) fn begin() {
+pub(crate) fn begin() {
     IS_TAKEN.store(false, Ordering::Relaxed);
     WARNINGS.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
@@ -98,6 +98,11 @@ pub(super) fn warn(message: impl Display) {
     WARNINGS.lock().unwrap_or_else(PoisonError::into_inner).push(message);
 }
 
+/// Returns the warnings so far.
+pub(crate) fn warnings() -> Vec<String> {
+    WARNINGS.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
 /// Says something on standard error that is neither a warning nor a result.
 pub(super) fn note(message: impl Display) {
     if !IS_QUIET.load(Ordering::Relaxed) {
@@ -117,7 +122,7 @@ pub(super) fn print(
     };
     let written = if is_json() {
         let mut object = object();
-        object["warnings"] = WARNINGS.lock().unwrap_or_else(PoisonError::into_inner).clone().into();
+        object["warnings"] = warnings().into();
         writeln!(out, "{object}")
     } else {
         text(&mut Printable(out))

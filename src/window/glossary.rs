@@ -24,17 +24,8 @@ macro_rules! terms {
     };
 }
 
-/// Group of related terms.
-#[derive(Clone, Debug)]
-pub struct Group {
-    /// Subject of the terms.
-    pub heading: &'static str,
-    /// Terms, in the order of the pipeline.
-    pub terms: Vec<Term>,
-}
-
-/// Returns all terms, in the order of the pipeline.
-pub fn groups() -> Vec<Group> {
+/// Returns all terms in groups, each with its heading, in the order of the pipeline.
+pub fn groups() -> [(&'static str, Vec<Term>); 7] {
     let described = |name, definition| Term {
         name,
         definition,
@@ -53,8 +44,6 @@ pub fn groups() -> Vec<Group> {
         ("Errors", ERROR_TERMS.to_vec()),
         ("Decoders", decoders.to_vec()),
     ]
-    .map(|(heading, terms)| Group { heading, terms })
-    .into()
 }
 
 /// Term of the field.
@@ -279,7 +268,7 @@ mod tests {
     #[test]
     fn every_term_is_listed_once_with_a_sentence() {
         let mut names = BTreeSet::new();
-        for term in groups().into_iter().flat_map(|group| group.terms) {
+        for term in groups().into_iter().flat_map(|(_, terms)| terms) {
             assert!(
                 names.insert((term.name, term.definition)),
                 "{} is listed twice",

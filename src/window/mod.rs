@@ -25,6 +25,7 @@ mod shared;
 pub mod surface_view;
 mod test_view;
 pub mod theme;
+mod timeline;
 mod training_worker;
 mod views;
 mod widgets;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use decoupler_files::{
     export::format_number,
-    figure::surface::{Drawing, OrbitCamera, Piece, Section, Sight, Surface, ViewMode},
+    figure::surface::{Drawing, OrbitCamera, Piece, Sight, Surface, SurfaceFigure, ViewMode},
 };
 use eframe::egui::{
     self, Color32, EventFilter, Key, Label, Mesh, Modifiers, PointerButton, Pos2, Rect, RectAlign, Response, RichText,
@@ -31,14 +31,10 @@ pub struct SurfaceView<'a> {
     pub label: &'a str,
     /// Surface that is drawn.
     pub surface: &'a Surface,
-    /// Node to mark, for instance the one under the pointer in a neighbouring view.
-    pub marked_node: Option<usize>,
-    /// Nodes to highlight, for instance those of a selected bar.
-    pub lit_nodes: &'a [usize],
-    /// Line of the section shown in a neighbouring figure.
-    pub section: Option<&'a Section>,
-    /// Dark or light theme.
-    pub theme: &'a Theme,
+    /// Figure of the surface, with the camera, the marked and highlighted nodes, and the line of a section.
+    pub figure: &'a SurfaceFigure,
+    /// True if the primary button, scrolling and the keys are left to the caller; drags with Shift or another button rotate.
+    pub is_touched: bool,
 }
 
 /// Response of a [`SurfaceView`] to the pointer.
@@ -73,21 +69,11 @@ impl SurfaceViewResponse {
 
 impl SurfaceView<'_> {
     /// Draws the surface in the remaining space and lets the user rotate it.
-    pub fn show(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
-        self.show_with(ui, camera, false)
-    }
-
-    /// As [`Self::show`], but the primary button, scrolling and the keys are left to the caller; drags with Shift or another
-    /// button rotate.
-    pub fn show_touched(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
-        self.show_with(ui, camera, true)
-    }
-
-    fn show_with(self, ui: &mut Ui, camera: OrbitCamera, is_touched: bool) -> SurfaceViewResponse {
+    pub fn show(self, ui: &mut Ui) -> SurfaceViewResponse {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         let camera = match self.surface.mode {
-            ViewMode::ThreeD => operate(ui, &response, camera, is_touched),
-            ViewMode::Top => camera,
+            ViewMode::ThreeD => operate(ui, &response, self.figure.camera, self.is_touched),
+            ViewMode::Top => self.figure.camera,
         };
         // Described to assistive technology as "z 4.0 to 5.0 mm".
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, self.label));
@@ -106,7 +92,7 @@ impl SurfaceView<'_> {
             self.paint(ui, rect, &mut shown);
         }
         if shown.response.has_focus() {
-            let stroke = Stroke::new(1.0, self.theme.palette.accent.gamma_multiply(0.6));
+            let stroke = Stroke::new(1.0, Theme::of(ui).palette.accent.gamma_multiply(0.6));
             ui.painter()
                 .rect_stroke(rect, f32::from(radius()), stroke, StrokeKind::Inside);
         }
@@ -116,8 +102,9 @@ impl SurfaceView<'_> {
     /// Paints the axes with their labels, the surface, the line of its section, and the nodes, one of them marked and some
     /// highlighted.
     fn paint(&self, ui: &mut Ui, rect: Rect, shown: &mut SurfaceViewResponse) {
-        let (painter, palette) = (ui.painter_at(rect), &self.theme.palette);
-        let painted = Painted::of(self.surface, shown.camera, self.theme, ui, &shown.response);
+        let (painter, theme) = (ui.painter_at(rect), Theme::of(ui));
+        let palette = &theme.palette;
+        let painted = Painted::of(self.surface, shown.camera, theme, ui, &shown.response);
         let Drawing { dots, sight, note, .. } = &painted.drawing;
         let is_idle = !shown.response.is_pointer_button_down_on();
         let pointer = shown.response.hover_pos().filter(|_| is_idle);
@@ -126,11 +113,11 @@ impl SurfaceView<'_> {
         shown.hovered_at = shown.hovered_node.and_then(|node| dots.position(node)).map(to_egui);
         paint(&painter, palette, &painted.drawing.frame);
         painter.add(egui::Shape::Mesh(Arc::clone(&painted.mesh)));
-        if let Some(section) = self.section {
+        if let Some(section) = &self.figure.section {
             paint(&painter, palette, &section.shapes(&painted.surface, sight));
         }
-        let marked = shown.hovered_node.or(self.marked_node);
-        paint(&painter, palette, &dots.shapes(marked, self.lit_nodes));
+        let marked = shown.hovered_node.or(self.figure.marked_node);
+        paint(&painter, palette, &dots.shapes(marked, &self.figure.lit_nodes));
         if let Some(note) = note {
             // Below the axes, partly in the margin of the card, to keep the size of the picture.
             let size = type_size().small;
@@ -273,43 +260,28 @@ fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
     }
 }
 
-/// Colour scale next to one or more surfaces: a vertical bar with ticks.
-#[derive(Clone, Debug)]
-pub struct ColourBar<'a> {
-    /// Scale of the values.
-    pub scale: &'a Surface,
-    /// Dark or light theme.
-    pub theme: &'a Theme,
-}
-
-impl ColourBar<'_> {
-    /// Width of the bar with its numbers, in points.
-    pub const WIDTH: f32 = Surface::SCALE_WIDTH;
-
-    /// Draws the bar `height` points high.
-    pub fn show(self, ui: &mut Ui, height: f32) -> Response {
-        let (rect, response) = ui.allocate_exact_size(vec2(Self::WIDTH, height), Sense::click());
-        let label = format!("Colour scale of {}", self.scale.quantity.axis_name());
-        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
-        ui.ctx().accesskit_node_builder(response.id, |node| {
-            let [low, high] = [self.scale.range.start(), self.scale.range.end()].map(|end| format_number(*end));
-            node.set_value(format!("{low} to {high}"));
-        });
-        let palette = &self.theme.palette;
-        if response.has_focus() || response.hovered() {
-            let colour = if response.has_focus() {
-                palette.accent
-            } else {
-                palette.line
-            };
-            let stroke = Stroke::new(1.0, colour);
-            ui.painter()
-                .rect_stroke(rect, f32::from(radius()), stroke, StrokeKind::Inside);
-        }
-        let painter = ui.painter_at(rect);
-        let measure = |text: &str| measure(&painter, text);
-        let shapes = self.scale.lay_out_scale(bounds(rect), &measure, &self.theme.errors);
-        paint(&painter, palette, &shapes);
-        response
+/// Draws the colour scale of one or more surfaces: a vertical bar with ticks, `height` points high.
+pub fn colour_bar_ui(ui: &mut Ui, scale: &Surface, height: f32) -> Response {
+    let (rect, response) = ui.allocate_exact_size(vec2(Surface::SCALE_WIDTH, height), Sense::click());
+    let label = format!("Colour scale of {}", scale.quantity.axis_name());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
+    ui.ctx().accesskit_node_builder(response.id, |node| {
+        let [low, high] = [scale.range.start(), scale.range.end()].map(|end| format_number(*end));
+        node.set_value(format!("{low} to {high}"));
+    });
+    let Theme { palette, errors, .. } = Theme::of(ui);
+    if response.has_focus() || response.hovered() {
+        let colour = if response.has_focus() {
+            palette.accent
+        } else {
+            palette.line
+        };
+        let stroke = Stroke::new(1.0, colour);
+        ui.painter()
+            .rect_stroke(rect, f32::from(radius()), stroke, StrokeKind::Inside);
     }
+    let painter = ui.painter_at(rect);
+    let measure = |text: &str| measure(&painter, text);
+    paint(&painter, palette, &scale.lay_out_scale(bounds(rect), &measure, errors));
+    response
 }

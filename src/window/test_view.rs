@@ -1,10 +1,10 @@
-//! Test set of a simulated array or of a recording, ready to be drawn.
+//! Test set of a run, ready to be drawn.
 
-use std::sync::Arc;
+use std::{ops::RangeInclusive, sync::Arc};
 
 use decoupler_core::{
     dataset::{Dataset, Simulation, SplitBy},
-    evaluation::{NodeAddress, Outlook, Run, RunError, RunSettings, recorded::HysteresisLoop},
+    evaluation::{NodeAddress, Outlook, RunError, RunSettings, node_rms_mm, recorded::HysteresisLoop},
     problem::{Channel, Problem},
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
@@ -13,79 +13,72 @@ use decoupler_files::{
     figure::{
         HeatMap, RegressionLine, TargetSurface, position_error_map,
         surface::{Quantity, Surface},
+        value_pairs,
     },
     import::SetupError,
 };
 use glam::DVec3;
-use ndarray::{Array2, ArrayView2, Axis, Zip};
+use ndarray::{Array2, ArrayView2, Axis, Slice, Zip};
 use thiserror::Error;
 
+use super::timeline::Timeline;
+
 /// Test set of a run, ready to be drawn.
-#[expect(clippy::large_enum_variant, reason = "there is one a run")]
 #[derive(Clone, Debug)]
-pub enum TestSet {
-    /// Nodes of a simulated array.
-    Array(TestView),
-    /// Targets of a recording.
-    Recording(RecordedTest),
+pub struct TestView {
+    /// Samples.
+    pub set: Arc<Dataset>,
+    /// Description of the channels.
+    pub problem: Arc<Problem>,
+    /// The array that is read, if its model is known.
+    pub skin: Option<Arc<Skin>>,
+    /// Surface through targets that have positions, or why there is none.
+    pub through: Option<Result<Arc<TargetSurface>, SurfaceError>>,
+    /// Range of the targets with positions.
+    range: RangeInclusive<f64>,
+    /// Rule of the division, which determines the order of the samples.
+    order: SplitBy,
+    /// Where the samples are on an axis of time.
+    pub timeline: Arc<Timeline>,
 }
 
-impl TestSet {
-    /// Prepares the test set of `run`; recorded samples are in the order of a division by `order`.
-    ///
-    /// # Errors
-    /// If no surface can be interpolated through the nodes of the array.
-    pub fn of(run: &Run, order: SplitBy) -> Result<Self, TestViewError> {
-        Ok(match &run.problem().sensor {
-            Some(simulation) => Self::Array(TestView::of(simulation, Arc::clone(run.test()))?),
-            None => Self::Recording(RecordedTest::new(
-                Arc::clone(run.test()),
-                Arc::clone(run.problem()),
-                order,
-            )),
-        })
-    }
+/// Array of which all drawn row-wires are read in each snapshot, and the surface through its nodes.
+#[derive(Debug)]
+pub struct Skin {
+    /// Interpolation from the heights of nodes to those of the drawn grid.
+    pub map: Arc<SurfaceMap>,
+    /// Sensor of the samples.
+    pub sensor: SensorModel,
+    /// Row-wires that are read and drawn, from 0.
+    pub rows: Vec<usize>,
+    /// Distance that a node can travel.
+    pub stroke_mm: f64,
+    /// Readings of the sensor at rest, rows read × M4; `None` if they cannot be computed.
+    pub unloaded_ohm: Option<Array2<f64>>,
+    /// Outlook of the scene; `None` if it takes long or cannot be computed.
+    pub outlook: Option<Outlook>,
+}
 
-    /// Samples.
-    pub fn set(&self) -> &Arc<Dataset> {
-        match self {
-            Self::Array(test) => &test.set,
-            Self::Recording(test) => &test.set,
-        }
-    }
+/// Charts of all test samples, computed in the background.
+#[derive(Debug)]
+pub struct TestCharts {
+    /// Regression lines through the actual and decoded values of each target, or of z of all nodes.
+    pub lines: Vec<RegressionLine>,
+    /// Errors of loading and unloading for each target that rises and falls.
+    pub loops: Vec<Option<HysteresisLoop>>,
+    /// Error over the position, if two targets are one.
+    pub error_map: Option<HeatMap>,
+    /// Root mean square error of each node of an array.
+    pub spread_mm: Vec<f64>,
+}
 
-    /// Returns the view of a simulated array; `None` for a recording.
-    pub fn array(&self) -> Option<&TestView> {
-        match self {
-            Self::Array(test) => Some(test),
-            Self::Recording(_) => None,
-        }
-    }
-
-    /// Returns the view of a recording; `None` for a simulated array.
-    pub fn recording(&self) -> Option<&RecordedTest> {
-        match self {
-            Self::Array(_) => None,
-            Self::Recording(test) => Some(test),
-        }
-    }
-
-    /// Returns what is drawn of `snapshot`, or of the last one if there are fewer; `answers` are the outputs of a network for
-    /// the samples. `None` where no surface goes through the targets.
-    pub fn drawing(&self, answers: Option<&Array2<f64>>, snapshot: usize) -> Option<Drawing> {
-        match self {
-            Self::Array(test) => Some(test.drawing(answers, snapshot)),
-            Self::Recording(test) => test.drawing(answers, snapshot),
-        }
-    }
-
-    /// Returns the number of test snapshots: whole frames of an array, or samples of a recording.
-    pub fn snapshots(&self) -> usize {
-        match self {
-            Self::Array(test) => test.snapshots.len(),
-            Self::Recording(test) => test.set.samples(),
-        }
-    }
+/// What is drawn of a snapshot of a test set.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    /// Actual surface.
+    pub actual: Surface,
+    /// Surface decoded by a network, and its error (decoded − actual).
+    pub decoded: Option<[Surface; 2]>,
 }
 
 /// Range of heights shown by colours and axes.
@@ -98,27 +91,6 @@ pub enum HeightScale {
     Fitted,
 }
 
-/// Test set of an array, ready to be drawn: its samples, and the surface through the nodes.
-#[derive(Clone, Debug)]
-pub struct TestView {
-    /// Samples.
-    pub set: Arc<Dataset>,
-    /// Samples of each snapshot, from the first row to the last.
-    pub snapshots: Arc<Vec<Vec<usize>>>,
-    /// Interpolation from the heights of nodes to those of the drawn grid.
-    pub map: Arc<SurfaceMap>,
-    /// Sensor of the samples.
-    pub sensor: SensorModel,
-    /// Row-wires that are read and drawn, from 0.
-    pub rows: Vec<usize>,
-    /// Distance that a node can travel.
-    pub stroke_mm: f64,
-    /// Readings of the sensor at rest, rows read × M4; `None` if they cannot be computed.
-    pub unloaded_ohm: Option<Arc<Array2<f64>>>,
-    /// Outlook of the scene; `None` if it takes long or cannot be computed.
-    pub outlook: Option<Outlook>,
-}
-
 impl TestView {
     /// Draws the test set of `settings`.
     ///
@@ -126,28 +98,93 @@ impl TestView {
     /// If the sensor, the scene or the number of samples is invalid.
     pub fn draw(settings: &RunSettings) -> Result<Self, TestViewError> {
         let simulation = settings.drawn()?;
-        Ok(Self::of(simulation, Arc::new(simulation.draw_test(settings.seed)?))?)
+        let set = Arc::new(simulation.draw_test(settings.seed)?);
+        Ok(Self::new(set, Arc::new(simulation.problem()), SplitBy::Time)?)
     }
 
-    /// Prepares the surface for an existing test set.
+    /// Prepares the test samples `set`, whose channels are those of `problem`, in the order of a division by `order`.
     ///
     /// # Errors
-    /// If no surface can be interpolated through the nodes.
-    pub fn of(simulation: &Simulation, set: Arc<Dataset>) -> Result<Self, SurfaceError> {
-        let sensor = simulation.sensor;
-        let row_count = sensor.scale.rows();
-        // There is no test set of a row that does not exist.
-        let rows = simulation.scene.rows.read(row_count).unwrap_or_default();
-        let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
-        let stroke_mm = simulation.stroke_mm();
+    /// If no surface can be interpolated through the nodes of the array.
+    pub fn new(set: Arc<Dataset>, problem: Arc<Problem>, order: SplitBy) -> Result<Self, SurfaceError> {
+        let skin = problem.sensor.as_ref().map(Skin::new).transpose()?;
+        let has_positions = !problem.positions.is_empty();
+        let through = has_positions.then(|| TargetSurface::new(&problem.positions, &problem.targets).map(Arc::new));
+        let at_positions = problem.positions.iter();
+        let at_positions = at_positions.flat_map(|position| set.targets().column(position.target).to_vec());
+        let (low, high) = at_positions.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
         Ok(Self {
-            unloaded_ohm: unloaded_ohm(&sensor, &rows).map(Arc::new),
-            snapshots: Arc::new(set.snapshots()),
+            skin: skin.map(Arc::new),
+            through,
+            range: low..=high,
+            timeline: Arc::new(Timeline::numbered(set.samples())),
             set,
+            problem,
+            order,
+        })
+    }
+
+    /// Returns the number of test snapshots: whole frames of an array, or samples of a recording.
+    pub fn snapshots(&self) -> usize {
+        self.set.samples() / self.skin.as_ref().map_or(1, |skin| skin.rows.len())
+    }
+
+    /// Returns the surface through targets with positions, if there is one.
+    pub fn through(&self) -> Option<&TargetSurface> {
+        self.through.as_ref()?.as_deref().ok()
+    }
+
+    /// Returns what is drawn of `snapshot`; `answers` are the outputs of a network for the samples. `None` where no surface
+    /// goes through the targets.
+    pub fn drawing(&self, answers: Option<&Array2<f64>>, snapshot: usize) -> Option<Drawing> {
+        if let Some(skin) = &self.skin {
+            return Some(skin.drawing(&self.set, answers, snapshot));
+        }
+        let through = self.through()?;
+        let decoded = answers.map_or(self.set.targets(), |answers| answers.view());
+        let [actual, decoded] = [self.set.targets(), decoded].map(|values| values.row(snapshot).to_vec());
+        let surfaces = through.surfaces(&actual, &decoded, self.range.clone());
+        Some(Drawing::of(surfaces, answers.is_some()))
+    }
+
+    /// Computes the charts of these decoded values (samples × targets).
+    pub fn charts(&self, answers: &Array2<f64>) -> TestCharts {
+        let of_target = |target| RegressionLine::of(value_pairs(&self.set, answers, target).into_iter());
+        if self.skin.is_some() {
+            return TestCharts {
+                lines: vec![of_target(None)],
+                loops: Vec::new(),
+                error_map: None,
+                spread_mm: node_rms_mm(&self.set, answers),
+            };
+        }
+        TestCharts {
+            lines: (0..self.set.outputs()).map(|target| of_target(Some(target))).collect(),
+            loops: HysteresisLoop::of_test(&self.set, answers.view(), self.order),
+            // Targets that have positions are not positions themselves.
+            error_map: match self.through {
+                None => error_map(&self.set, answers, &self.problem.targets),
+                Some(_) => None,
+            },
+            spread_mm: Vec::new(),
+        }
+    }
+}
+
+impl Skin {
+    fn new(simulation: &Simulation) -> Result<Self, SurfaceError> {
+        let sensor = simulation.sensor;
+        // There is no test set of a row that does not exist.
+        let rows = simulation.scene.rows.read(sensor.scale.rows()).unwrap_or_default();
+        let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
+        Ok(Self {
+            unloaded_ohm: unloaded_ohm(&sensor, &rows),
             map: SurfaceMap::shared(&x_mm, &y_mm)?,
             sensor,
             rows,
-            stroke_mm,
+            stroke_mm: simulation.stroke_mm(),
             outlook: outlook(simulation),
         })
     }
@@ -158,17 +195,19 @@ impl TestView {
         Some(row_index * self.sensor.scale.nodes_per_row() + address.node)
     }
 
-    /// Returns what is drawn of `snapshot`, or of the last one if there are fewer; `answers` have the shape of the set's
-    /// coordinates.
-    pub fn drawing(&self, answers: Option<&Array2<f64>>, snapshot: usize) -> Drawing {
-        let snapshot = snapshot.min(self.snapshots.len().saturating_sub(1));
-        let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
+    /// Returns what is drawn of a snapshot of `set`; `answers` have the shape of its coordinates.
+    pub fn drawing(&self, set: &Dataset, answers: Option<&Array2<f64>>, snapshot: usize) -> Drawing {
         let nodes = |coordinates_mm: ArrayView2<'_, f64>| {
-            let rows = samples.iter().map(|&sample| coordinates_mm.row(sample).to_vec());
-            Vec::from_iter(rows.flat_map(|row| Vec::from_iter(row.chunks_exact(3).map(DVec3::from_slice))))
+            let coordinates = Vec::from_iter(
+                coordinates_mm
+                    .slice_axis(Axis(0), self.samples(snapshot))
+                    .iter()
+                    .copied(),
+            );
+            Vec::from_iter(coordinates.chunks_exact(3).map(DVec3::from_slice))
         };
-        let decoded = answers.map_or(self.set.targets(), |answers| answers.view());
-        let nodes = [self.set.targets(), decoded].map(nodes);
+        let decoded = answers.map_or(set.targets(), |answers| answers.view());
+        let nodes = [set.targets(), decoded].map(nodes);
         let height_mm = self.sensor.geometry.height_mm;
         let (heights, quantities) = (
             height_mm - self.stroke_mm..=height_mm,
@@ -179,21 +218,28 @@ impl TestView {
         Drawing::of(surfaces, answers.is_some())
     }
 
-    /// Returns the drops of the readings below those at rest, in percent, rows read × M4; `None` if there are no readings at
-    /// rest, or the given readings do not cover all rows.
-    pub fn drops_percent(&self, readings_ohm: &Array2<f64>) -> Option<Array2<f64>> {
-        let unloaded_ohm = self.unloaded_ohm.as_deref()?;
-        if readings_ohm.dim() != unloaded_ohm.dim() {
-            return None;
-        }
-        let ratios = Zip::from(readings_ohm).and(unloaded_ohm);
+    /// Returns the drops of the readings of a snapshot of `set` below those at rest, in percent, rows read × M4; `None` if there
+    /// are no readings at rest.
+    pub fn drops_percent(&self, set: &Dataset, snapshot: usize) -> Option<Array2<f64>> {
+        let readings = set.readings();
+        let readings = readings.slice_axis(Axis(0), self.samples(snapshot));
+        let ratios = Zip::from(readings).and(self.unloaded_ohm.as_ref()?);
         Some(ratios.map_collect(|reading, unloaded| 100.0 * (1.0 - reading / unloaded)))
     }
 
-    /// Returns the readings of a snapshot, rows read × M4.
-    pub fn readings_ohm(&self, snapshot: usize) -> Array2<f64> {
-        let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
-        self.set.readings().select(Axis(0), samples)
+    /// Samples of a snapshot: snapshots follow one another, each with all rows.
+    fn samples(&self, snapshot: usize) -> Slice {
+        let rows = self.rows.len();
+        Slice::from(snapshot * rows..(snapshot + 1) * rows)
+    }
+}
+
+impl Drawing {
+    fn of([actual, decoded, error]: [Surface; 3], is_decoded: bool) -> Self {
+        Self {
+            actual,
+            decoded: is_decoded.then_some([decoded, error]),
+        }
     }
 }
 
@@ -232,120 +278,6 @@ pub enum TestViewError {
     /// No surface can be interpolated through the nodes.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
-}
-
-/// What is drawn of a sample of a test set.
-#[derive(Clone, Debug)]
-pub struct Drawing {
-    /// Actual surface.
-    pub actual: Surface,
-    /// Surface decoded by a network, and its error (decoded − actual).
-    pub decoded: Option<[Surface; 2]>,
-}
-
-impl Drawing {
-    fn of([actual, decoded, error]: [Surface; 3], is_decoded: bool) -> Self {
-        Self {
-            actual,
-            decoded: is_decoded.then_some([decoded, error]),
-        }
-    }
-}
-
-/// Test samples of a recording, ready to be drawn.
-#[derive(Clone, Debug)]
-pub struct RecordedTest {
-    /// Samples.
-    pub set: Arc<Dataset>,
-    /// Description of the channels.
-    pub problem: Arc<Problem>,
-    /// Minimum and maximum of each target.
-    pub ranges: Arc<[(f64, f64)]>,
-    /// Positions of targets.
-    pub positions: Positions,
-    /// Rule of the division, which determines the order of the samples.
-    order: SplitBy,
-}
-
-/// Positions of targets on the skin.
-#[derive(Clone, Debug)]
-pub enum Positions {
-    /// No target has a position.
-    None,
-    /// No surface can be interpolated through the positions.
-    NoSurface(SurfaceError),
-    /// Surface through the positions.
-    Surface(Arc<TargetSurface>),
-}
-
-/// Charts of all test samples of a recording, computed in the background.
-#[derive(Debug)]
-pub struct TargetCharts {
-    /// Regression lines through the actual and decoded values of each target.
-    pub lines: Vec<RegressionLine>,
-    /// Errors of loading and unloading for each target that rises and falls.
-    pub loops: Vec<Option<HysteresisLoop>>,
-    /// Error over the position, if two targets are one.
-    pub error_map: Option<HeatMap>,
-}
-
-impl Positions {
-    fn of(problem: &Problem) -> Self {
-        if problem.positions.is_empty() {
-            return Self::None;
-        }
-        match TargetSurface::new(&problem.positions, &problem.targets) {
-            Ok(surface) => Self::Surface(Arc::new(surface)),
-            Err(reason) => Self::NoSurface(reason),
-        }
-    }
-}
-
-impl RecordedTest {
-    /// Prepares the test samples `set`, whose channels are those of `problem`, in the order of a division by `order`.
-    pub fn new(set: Arc<Dataset>, problem: Arc<Problem>, order: SplitBy) -> Self {
-        let range = |target| {
-            let values = set.targets();
-            let extreme = |pick: fn(f64, f64) -> f64, none| values.column(target).iter().copied().fold(none, pick);
-            (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY))
-        };
-        Self {
-            ranges: (0..set.outputs()).map(range).collect(),
-            positions: Positions::of(&problem),
-            set,
-            problem,
-            order,
-        }
-    }
-
-    /// Returns what is drawn of `sample`, or of the last one if there are fewer.
-    pub fn drawing(&self, answers: Option<&Array2<f64>>, sample: usize) -> Option<Drawing> {
-        let Positions::Surface(through) = &self.positions else {
-            return None;
-        };
-        let sample = sample.min(self.set.samples().saturating_sub(1));
-        let decoded = answers.map_or(self.set.targets(), |answers| answers.view());
-        let [actual, decoded] = [self.set.targets(), decoded].map(|values| values.row(sample).to_vec());
-        let surfaces = through.surfaces(&actual, &decoded, through.range_of(&self.ranges));
-        Some(Drawing::of(surfaces, answers.is_some()))
-    }
-
-    /// Computes the charts of these decoded values (samples × targets).
-    pub fn charts(&self, answers: &Array2<f64>) -> TargetCharts {
-        let line = |target| {
-            let (actual, decoded) = (self.set.targets(), answers.column(target));
-            RegressionLine::of(actual.column(target).iter().copied().zip(decoded.iter().copied()))
-        };
-        TargetCharts {
-            lines: (0..self.set.outputs()).map(line).collect(),
-            loops: HysteresisLoop::of_test(&self.set, answers.view(), self.order),
-            error_map: match &self.positions {
-                // Targets that have positions are not positions themselves.
-                Positions::None => error_map(&self.set, answers, &self.problem.targets),
-                _ => None,
-            },
-        }
-    }
 }
 
 fn error_map(set: &Dataset, answers: &Array2<f64>, targets: &[Channel]) -> Option<HeatMap> {

@@ -166,3 +166,52 @@ fn the_focus_is_visible_on_every_control() {
         assert!(seen > 8, "{view}: {seen}");
     }
 }
+
+#[test]
+fn the_top_bar_is_reached_from_left_to_right() {
+    let mut driver = Driver::open();
+    let mut reached: Vec<(String, f32)> = Vec::new();
+    for _ in 0..30 {
+        driver.press(Key::Tab);
+        let Some((name, place)) = focused(&mut driver) else {
+            continue;
+        };
+        if place.bottom() > 44.0 {
+            break;
+        }
+        reached.push((name, place.left()));
+    }
+    assert!(reached.is_sorted_by(|one, other| one.1 < other.1), "{reached:?}");
+    let names = Vec::from_iter(reached.iter().map(|(name, _)| name.as_str()));
+    assert!(
+        names.starts_with(&VIEWS) && names.ends_with(&["Export", "Undo change of settings", "Search actions", "Keys"]),
+        "{names:?}"
+    );
+}
+
+#[test]
+fn the_search_fields_of_the_help_let_the_focus_go() {
+    let mut driver = Driver::open();
+    driver.act("Glossary");
+    assert_eq!(focused(&mut driver).unwrap().0, "Term");
+    driver.press(Key::Tab);
+    driver.harness().run_steps(2);
+    assert_ne!(focused(&mut driver).unwrap().0, "Term");
+}
+
+#[test]
+fn tables_have_rows_and_facts_are_read_once() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    let roles = |driver: &mut Driver, role| driver.harness().query_all(By::new().role(role)).count();
+    assert!(roles(&mut driver, Role::Table) >= 1 && roles(&mut driver, Role::Row) >= 3);
+    show(&mut driver, "Sensor");
+    let nodes = driver.harness().root().children_recursive();
+    let read = nodes.filter(|node| !node.accesskit_node().is_hidden());
+    let names = read.filter(|node| {
+        let node = node.accesskit_node();
+        node.label().or(node.value()).as_deref() == Some("Condition number")
+    });
+    assert_eq!(names.count(), 0, "the fact is read with its value");
+}

@@ -13,10 +13,10 @@ use decoupler_core::{evaluation::RunSettings, training::StoppingRules};
 const CHOSEN: [(&str, Option<&str>); 6] = [
     ("Hidden nodes", None),
     ("Method", None),
-    ("Scaling", Some("Network inputs")),
-    ("Epochs", Some("When to stop")),
-    ("Restarts", Some("Method settings")),
-    ("Combine restarts", Some("Method settings")),
+    ("Scaling", Some("Advanced")),
+    ("Epochs", Some("Advanced")),
+    ("Restarts", Some("Advanced")),
+    ("Combine restarts", Some("Advanced")),
 ];
 
 fn unfold(driver: &mut Driver) {
@@ -50,7 +50,7 @@ fn chosen_settings_are_disabled_show_what_was_chosen_and_are_kept_when_the_choic
     let run = driver.state().run.as_ref().unwrap();
     let (setup, asked) = (run.setup.clone(), run.asked.clone());
     let chosen: RunSettings = *setup.settings();
-    assert_ne!(&chosen, asked.settings(), "the choice differs from the defaults");
+    assert_ne!(chosen, asked.settings, "the choice differs from the defaults");
     let expected = [
         ("Hidden nodes", chosen.hidden.to_string()),
         ("Method", chosen.training.method.name().to_owned()),
@@ -118,13 +118,13 @@ fn one_network_per_row_wire_is_set_by_hand() {
     }
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.mean("row", "row-wire");
-    driver.unfold_to("Network inputs", "Scaling");
+    driver.unfold_to("Advanced", "Scaling");
     assert!(driver.is_enabled("Choose settings automatically"));
     driver.click_button("Known");
     driver.settle();
     assert!(!driver.is_enabled("Choose settings automatically"));
     assert!(driver.is_enabled("Hidden nodes") && driver.is_enabled("Method"));
-    driver.unfold_to("When to stop", "Epochs");
+    driver.unfold_to("Advanced", "Epochs");
     driver.enter("Epochs", "3");
     driver.click("▶ Train");
     driver.wait_for_training();

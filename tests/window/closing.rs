@@ -198,7 +198,7 @@ fn a_training_on_a_recording_is_saved_at_closing() {
 fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
     for (topic, run, line) in [
         ("Table 1", "▶ Run", "Study: Table 1"),
-        ("Speed against accuracy", "▶ Measure", "Study: Speed against accuracy"),
+        ("Speed against accuracy", "▶ Run", "Study: Speed against accuracy"),
     ] {
         let mut driver = Driver::open();
         driver.click_button("Study");
@@ -241,7 +241,7 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
     driver.click_button("Study");
     driver.click("Speed against accuracy");
     trading::tiny(&mut driver);
-    driver.type_into("Noise levels", "0");
+    driver.type_into("Noise levels (%)", "0");
     trading::measure(&mut driver);
     ask(&mut driver);
     assert!(driver.has("Study: Speed against accuracy") && driver.says("not exported as a table"));
@@ -256,7 +256,7 @@ fn a_cross_validation_and_an_analysis_are_not_ended_without_asking() {
     driver.limit_epochs("100000");
     driver.click_button("Study");
     driver.click("Cross-validation");
-    driver.click_button("▶ Cross-validate");
+    driver.click_button("▶ Run");
     ask(&mut driver);
     assert!(
         driver.has("Study: Cross-validation") && driver.says("5 trainings"),
@@ -267,7 +267,7 @@ fn a_cross_validation_and_an_analysis_are_not_ended_without_asking() {
     driver.click("■ Cancel");
     driver.settle();
     driver.click("What the readings determine");
-    driver.click_button("▶ Analyse");
+    driver.click_button("▶ Run");
     ask(&mut driver);
     assert!(
         driver.has("Study: What the readings determine"),

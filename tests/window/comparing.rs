@@ -2,12 +2,9 @@
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use decoupler::window::{Effect, Phase};
+use decoupler::window::Effect;
 use decoupler_core::evaluation::{Run, RunSettings};
-use decoupler_files::{
-    export::{NetworkFile, format_number},
-    figure::surface::ViewMode,
-};
+use decoupler_files::export::{NetworkFile, format_number};
 use eframe::egui::{Event, Key};
 
 use crate::{
@@ -236,28 +233,6 @@ fn runs_are_numbered_even_after_the_largest_number() {
 }
 
 #[test]
-fn figures_of_the_paper_are_one_click() {
-    let mut driver = Driver::open();
-    driver.click("10×6, top view");
-    let settings = driver.state().draft;
-    assert_eq!(settings.simulation().unwrap().sensor.scale.to_string(), "10×6_3×18");
-    assert_eq!((settings.hidden, settings.simulation().unwrap().samples), (12, 1000));
-    assert_eq!(driver.state().look.mode, ViewMode::Top);
-    driver.wait("its training", |driver| driver.state().phase == Phase::Training);
-    assert!(!driver.is_enabled("10×10, top view"), "one at a time");
-    driver.press_with(eframe::egui::Modifiers::COMMAND, Key::Period);
-    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
-    driver.click("10×6, nodes");
-    assert_eq!(driver.views().train.tab, "Nodes");
-    driver.wait("another training, for the first was stopped", |driver| {
-        driver.state().phase == Phase::Training && driver.state().result().is_some()
-    });
-    driver.click("Error bars");
-    driver.press_with(eframe::egui::Modifiers::COMMAND, Key::Period);
-    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
-}
-
-#[test]
 fn displayed_pictures_are_saved_in_the_format_of_their_extension() {
     const CHART: &str = "Chart, SVG";
     let folder = tempfile::tempdir().unwrap();
@@ -310,14 +285,14 @@ fn saved_surfaces_use_the_current_camera() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.click("Turn");
     let first = saved_surfaces(&mut driver);
     assert!(
         first == saved_surfaces(&mut driver),
         "the same view gives the same picture"
     );
     let press = |driver: &mut Driver, key| {
-        driver.get("Actual surface").focus();
+        // The keys on the actual surface press it.
+        driver.get("Decoded surface").focus();
         driver.settle();
         driver.press(key);
     };

@@ -19,12 +19,12 @@ use crate::{
 };
 
 const SAVE: &str = "Checkpoint, resumable";
-const OPEN: &str = "Open checkpoint…";
+const OPEN: &str = "Open files";
 
-/// Types `path` into the form behind `button` and confirms.
+/// Types `path` into the form of an action and confirms.
 fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
     if button == OPEN {
-        driver.open_form(button);
+        driver.act(button);
     } else {
         driver.export(button);
     }
@@ -91,6 +91,7 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
         let (starts, shown) = (run.starts(), opened.driver.state().run.as_ref().unwrap());
         assert_eq!(shown.starts, starts);
         assert_eq!(shown.history, run.leader().history());
+        opened.driver.details();
         opened.driver.assert_shows(&network_figures(&run));
         assert!(opened.driver.has("SPREAD OVER 4 RESTARTS"));
         let percent = Spread::of(starts.iter().filter_map(StartRecord::percent)).unwrap();
@@ -134,6 +135,7 @@ fn the_spread_is_shown_while_the_starts_train() {
         driver.state().phase == Phase::Training
             && starts.is_some_and(|starts| starts.len() == 3 && starts[0].epochs > 1)
     });
+    driver.details();
     assert!(driver.has("SPREAD OVER 3 RESTARTS") && driver.has("0 of 3 restarts ended"));
     driver.click("■ Stop");
     ended(&mut driver);
@@ -215,6 +217,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     let mut driver = Driver::open();
     enter_path(&mut driver, OPEN, &terminal);
     driver.wait("the training", |driver| driver.epochs() == 7);
+    driver.details();
     assert!(driver.state().draft == settings && driver.has("SPREAD OVER 3 RESTARTS"));
     save(&mut driver, SAVE, &window);
     driver.click("▶ Resume");
@@ -254,6 +257,7 @@ fn a_checkpoint_shows_the_wall_time_of_all_starts_or_none() {
             let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());
             result.is_some_and(|result| result.wall_time == file.wall_time)
         });
+        driver.details();
         let texts = driver.texts();
         for (name, value) in [("Training, all restarts", all), ("Time per epoch", an_epoch)] {
             let place = texts.iter().rposition(|text| text == name).unwrap();
@@ -330,7 +334,7 @@ fn levenberg_marquardt_continues_where_momentum_ended() {
         driver.says(" from epoch 15"),
         "the chart marks where the method changed"
     );
-    assert!(!driver.says("The settings have changed"));
+    assert!(!driver.says("previous settings"));
     driver.click("Training state");
     driver.settle();
     assert!(driver.says(" from epoch 15"));
@@ -350,6 +354,7 @@ fn more_epochs_of_the_same_method_give_the_result_of_a_longer_training() {
         ended(driver);
         let whole = run_of(&with_epochs(setup, 30));
         assert_eq!(driver.state().run.as_ref().unwrap().history, whole.leader().history());
+        driver.details();
         driver.assert_shows(&network_figures(&whole));
         driver.click("▶ Train");
         ended(driver);
@@ -417,6 +422,7 @@ fn bayesian_regularisation_says_how_many_weights_the_data_determine() {
     let effective = leader.history()[leader.best_epoch()].effective_parameters.unwrap();
     let weights = leader.weights();
     let text = format!("Effective parameters {} of {weights} weights", format_number(effective));
+    driver.details();
     assert!(driver.has(&text), "{text} is not in {:#?}", driver.texts());
     choose_method(&mut driver, "Levenberg-Marquardt");
     driver.train();
@@ -435,6 +441,7 @@ fn the_spread_and_continue_fit_in_narrow_windows() {
         buttons.windows(2).all(|pair| pair[0].right() <= pair[1].left()),
         "{buttons:?}"
     );
+    driver.details();
     let column = driver.get("ERRORS ON THE TEST SET").rect().left();
     let of_spread = |text: &str| text.starts_with("test Z %, ");
     let places: Vec<_> = driver

@@ -83,6 +83,7 @@ fn the_decoders_figures_are_the_librarys() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
+    driver.details();
     assert!(driver.has("Decoding a snapshot"));
     assert!(table(&driver).is_empty(), "folded away until asked for");
     driver.click("More decoders");
@@ -114,6 +115,7 @@ fn a_running_training_is_not_measured_until_it_is_paused() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
+    driver.details();
     driver.click("More decoders");
     wait_for_all(&mut driver);
     choose_method(&mut driver, "Momentum, Eq. (11)");

@@ -32,15 +32,7 @@ use crate::rasterise::Rasteriser;
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Parts of the configuration that are folded away at first.
-const FOLDED: [&str; 7] = [
-    "Scene",
-    "Samples",
-    "Geometry",
-    "Network inputs",
-    "When to stop",
-    "Method settings",
-    "Figures of the paper",
-];
+const FOLDED: [&str; 3] = ["Scene", "Samples", "Advanced"];
 
 /// Label of the button that closes a notice.
 const DISMISS: &str = "Dismiss";
@@ -97,6 +89,15 @@ impl Driver {
         driver
     }
 
+    /// Opens the window with its state remembered in a file, and its runs kept in a folder.
+    pub(crate) fn open_again(file: &Path, runs: &Path) -> Self {
+        let (file, runs) = (WindowFile::read(file.to_owned()), runs.to_owned());
+        let keeping = |window: DecouplerWindow| window.keeping_runs(runs);
+        let mut driver = Self::open_as(vec2(1440.0, 900.0), Some(file), keeping);
+        driver.unfold();
+        driver
+    }
+
     fn open_as(
         size: Vec2,
         file: Option<WindowFile>,
@@ -143,7 +144,7 @@ impl Driver {
 
     /// Chooses the paper's scene and waits for its surface.
     pub(crate) fn choose_papers_scene(&mut self) {
-        self.click("Paper's scene");
+        self.click("Paper");
         self.get("Hidden nodes").scroll_to_me();
         self.wait("the paper's surface", |driver| {
             let preview = driver.state().preview.as_ref();
@@ -531,7 +532,7 @@ impl Driver {
 
     /// Configures a small network on the smallest array of the paper, which is trained quickly.
     pub(crate) fn configure_small(&mut self) {
-        self.click("Paper's scene");
+        self.click("Paper");
         self.click("10×6");
         self.enter("Hidden nodes", "6");
         self.enter("Training samples", "200");
@@ -541,8 +542,8 @@ impl Driver {
         self.wait("the small array's surface", |driver| {
             driver
                 .state()
-                .test()
-                .is_some_and(|test| test.sensor == wanted.simulation().unwrap().sensor)
+                .skin()
+                .is_some_and(|skin| skin.sensor == wanted.simulation().unwrap().sensor)
         });
     }
 
@@ -564,6 +565,15 @@ impl Driver {
         self.wait("the end of the training", |driver| {
             matches!(driver.state().phase, Phase::Ended(_))
         });
+    }
+
+    /// Unfolds the details of the result.
+    #[track_caller]
+    pub(crate) fn details(&mut self) {
+        if !self.has("COST") {
+            self.click("Details");
+            self.settle();
+        }
     }
 
     /// Waits until the ended training is among the kept runs: its folder is written in the background.
@@ -630,8 +640,11 @@ pub(crate) fn trained(settings: RunSettings) -> Run {
 pub(crate) fn table_of(run: &Run) -> Vec<String> {
     let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
     let tables = ErrorTable::of_scores(run.problem(), &run.scores().unwrap(), None);
+    // Coordinates that do not vary have no column.
+    let is_shown = |place: usize| place == 0 || tables[0].rows.iter().any(|row| row.errors[place] >= Some(1e-3));
     let cells = tables[0].rows.iter().flat_map(|row| {
-        let named = columns.iter().zip(&row.errors);
+        let named = columns.iter().zip(&row.errors).enumerate();
+        let named = named.filter(|(place, _)| is_shown(*place)).map(|(_, named)| named);
         named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(*value)))
     });
     cells.collect()

@@ -93,12 +93,11 @@ fn a_table_ends_with_the_librarys_own_numbers() {
             }
         }
     }
-    assert_eq!(compared, 2 * 8, "nothing is published for these sizes");
+    assert_eq!(compared, 2 * 7, "nothing is published for these sizes");
     let remarks = [describe_failures(&results), describe_worse_than_mean(&results)].concat();
     for remark in &remarks {
         assert!(driver.has(remark), "{remark}");
     }
-    assert_eq!(driver.has("Remarks"), !remarks.is_empty());
     driver.settle();
 
     for _ in 0..2 {
@@ -217,10 +216,10 @@ fn invalid_lists_say_why_until_they_are_fixed() {
     driver.click("Table 2");
     driver.enter("Folds", "500");
     assert!(driver.says("500 folds of 100 samples"), "{:#?}", driver.texts());
-    driver.click("Reset to the paper's values");
+    driver.click("Reset to the default values");
     assert!(driver.is_enabled("▶ Run"));
     driver.click("Table 1");
-    driver.click("Reset to the paper's values");
+    driver.click("Reset to the default values");
     assert!(driver.is_enabled("▶ Run"));
 }
 
@@ -241,8 +240,8 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     experiment.base.training.stopping.epochs = 3;
     let results = by_library(&experiment);
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
-        let percent = decoupler_files::export::format_percent(cell.percent().median);
-        let label = format!("{z}: median Z error {percent}");
+        let percent = decoupler_files::export::format_number(cell.percent().median);
+        let label = format!("{z}, Z % median: {percent}");
         assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     }
     driver.settle();
@@ -337,6 +336,7 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_shown_as_it_grows() {
     }
     fs::write(home.path().join("trials").join(format!("{}.json", "0".repeat(32))), "{").unwrap();
     driver.wait("the damaged file", |driver| driver.says("00000000"));
+    driver.click("■ Cancel");
     run_to_the_end(&mut driver);
     assert!(!driver.says("Sweep folder"), "results replace the folder");
 
@@ -356,13 +356,19 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     driver.settle();
     assert!(driver.says("samples"), "the recording has no number of samples to vary");
     driver.choose("Down", "Scaling");
+    for scaling in ["Min-max", "Whitening"] {
+        driver.click(scaling);
+    }
+    assert!(driver.says("there are no values for scaling"), "{:#?}", driver.texts());
+    for scaling in ["Min-max", "Whitening"] {
+        driver.click(scaling);
+    }
     driver.type_into("Values across", "4 12");
-    driver.type_into("Values down", "minmax whiten");
     driver.enter("Epochs", "5");
     run_to_the_end(&mut driver);
     let alone = trained(&plan(&path));
-    let percent = decoupler_files::export::format_percent(alone.errors().percent());
-    let label = format!("12, minmax: median mean absolute error {percent}");
+    let percent = decoupler_files::export::format_number(alone.errors().percent());
+    let label = format!("12, minmax, error % median: {percent}");
     assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     driver.click("Cell 12, minmax");
     driver.click(OPEN);

@@ -21,8 +21,8 @@ fn drawn(driver: &mut Driver) {
     driver.wait("its surface", |driver| {
         driver
             .state()
-            .test()
-            .is_some_and(|test| test.sensor == driver.state().draft.simulation().unwrap().sensor)
+            .skin()
+            .is_some_and(|skin| skin.sensor == driver.state().draft.simulation().unwrap().sensor)
     });
     driver.settle();
 }
@@ -63,10 +63,7 @@ fn a_large_array_trains() {
     driver.enter("Hidden nodes", "4");
     driver.enter("Epochs", "3");
     drawn(&mut driver);
-    assert_eq!(
-        driver.views().train.drawn.surfaces.as_ref().unwrap().actual.nodes.len(),
-        1600
-    );
+    assert_eq!(driver.views().train.drawing().unwrap().actual.nodes.len(), 1600);
     assert_eq!(try_training(&mut driver), None);
     assert!(driver.has("Decoded surface"));
     driver.click_button("Top view");
@@ -121,7 +118,7 @@ fn extreme_resistivities_and_geometries_train_or_say_why_not() {
             driver.enter(label, text);
         }
         driver.wait("an answer", |driver| {
-            let drawn = driver.state().test().map(|test| test.sensor);
+            let drawn = driver.state().skin().map(|skin| skin.sensor);
             drawn == Some(driver.state().draft.simulation().unwrap().sensor) || driver.notice().is_some()
         });
         driver.settle();

@@ -128,11 +128,15 @@ fn exports_at_every_fault() {
             for decoder in ["Radial basis", "Fuzzy rules", "Network + Newton"] {
                 driver.click(decoder);
             }
-            for (label, text) in [("Noise levels", "0"), ("Hidden nodes", "2"), ("Maximum samples", "100")] {
+            for (label, text) in [
+                ("Noise levels (%)", "0"),
+                ("Hidden nodes", "2"),
+                ("Maximum samples", "100"),
+            ] {
                 driver.type_into(label, text);
             }
             driver.enter("Maximum epochs", "1");
-            driver.click("▶ Measure");
+            driver.click("▶ Run");
             driver.wait("the end", |driver| !driver.is_enabled("■ Cancel"));
         }
         if view == "Table 1" {

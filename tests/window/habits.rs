@@ -114,3 +114,40 @@ fn the_interface_grows_and_shrinks_within_limits() {
     driver.press_with(Modifiers::COMMAND, Key::Num0);
     assert_eq!(scale(&mut driver), 10);
 }
+
+#[test]
+fn the_list_has_the_actions_of_every_view_and_shows_it_first() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.click_button("Study");
+    driver.press_with(Modifiers::COMMAND, Key::K);
+    driver.type_into("Action", "start training");
+    driver.press(Key::Enter);
+    driver.wait("the end of the training", |driver| {
+        matches!(driver.state().phase, Phase::Ended(_))
+    });
+    assert_eq!(driver.shown(), "Train");
+}
+
+#[test]
+fn undo_says_what_it_undid_and_shows_it() {
+    let mut driver = Driver::open();
+    driver.enter("Hidden nodes", "7");
+    // Changes less than a second apart are one.
+    driver.harness().run_steps(80);
+    driver.click_button("Compare");
+    driver.act("Undo change of settings");
+    driver.settle();
+    assert!(driver.says("Undone: hidden"), "{:#?}", driver.texts());
+    assert_eq!((driver.shown(), driver.state().draft.hidden), ("Train", 12));
+    driver.act("Redo change of settings");
+    driver.settle();
+    assert!(driver.says("Redone: hidden"), "{:#?}", driver.texts());
+    assert_eq!(driver.state().draft.hidden, 7);
+    driver.harness().run_steps(80);
+    driver.click("Best accuracy");
+    driver.harness().run_steps(80);
+    driver.act("Undo change of settings");
+    driver.settle();
+    assert!(driver.says("Undone: preset Best accuracy"), "{:#?}", driver.texts());
+}

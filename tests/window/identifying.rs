@@ -32,7 +32,7 @@ const FOLDS: &str = "Cross-validation";
 
 /// Analyses the readings.
 fn analyse(driver: &mut Driver) {
-    driver.click_button("▶ Analyse");
+    driver.click_button("▶ Run");
     driver.wait("the analysis", |driver| driver.says("folds by time; analysed in"));
     driver.settle();
 }
@@ -59,7 +59,7 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
         driver.assert_shows(&[sentence(&describe_target(name, target))]);
     }
     // A later change of the settings is reported.
-    assert!(!driver.says("have changed since"));
+    assert!(!driver.says("Result of the previous settings"));
     let hidden = setup.settings().hidden + 1;
     let changed = setup.with_settings(RunSettings {
         hidden,
@@ -67,7 +67,15 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
     });
     driver.window_mut().apply(Effect::TakeSetup(Box::new(changed)));
     driver.settle();
-    assert!(driver.says("have changed since"), "{:#?}", driver.texts());
+    assert!(driver.says("Result of the previous settings"), "{:#?}", driver.texts());
+    // Findings about another recording are not shown.
+    let mut other = plan.clone();
+    other.import.data = plan.import.data.with_file_name("other.csv");
+    fs::copy(&plan.import.data, &other.import.data).unwrap();
+    let other = Setup::recording(*setup.settings(), other);
+    driver.window_mut().apply(Effect::TakeSetup(Box::new(other)));
+    driver.settle();
+    assert!(!driver.says("analysed in"), "{:#?}", driver.texts());
 }
 
 #[test]
@@ -101,7 +109,7 @@ fn a_cross_validation_of_a_recording_agrees_with_the_library() {
         folder: _folder,
     } = open_recording(FOLDS);
     driver.enter("Folds", "3");
-    driver.click_button("▶ Cross-validate");
+    driver.click_button("▶ Run");
     driver.wait("the folds", |driver| driver.says("3 folds by time"));
     driver.settle();
     let plan = setup.plan().unwrap();
@@ -120,7 +128,7 @@ fn a_cross_validation_of_a_recording_agrees_with_the_library() {
             "{cell} is not among {shown:#?}"
         );
     }
-    assert!(driver.says("The readings"), "what they determine: {shown:#?}");
+    assert!(driver.says("with these settings, use ridge"), "{shown:#?}");
 }
 
 #[test]
@@ -129,7 +137,7 @@ fn an_analysis_of_a_recording_can_be_cancelled_and_closing_asks_about_it() {
     opened.change(|settings| settings.training.stopping.epochs = 100_000);
     let driver = &mut opened.driver;
     driver.settle();
-    driver.click_button("▶ Cross-validate");
+    driver.click_button("▶ Run");
     driver.wait("the trainings", |driver| driver.says("Cross-validation…"));
     assert!(!driver.close(), "the analysis is not lost without a question");
     driver.harness().run_steps(2);
@@ -141,5 +149,5 @@ fn an_analysis_of_a_recording_can_be_cancelled_and_closing_asks_about_it() {
     driver.click_button("Cancel");
     driver.click_button("■ Cancel");
     driver.settle();
-    assert!(driver.is_enabled("▶ Cross-validate"));
+    assert!(driver.is_enabled("▶ Run"));
 }

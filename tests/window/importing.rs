@@ -134,7 +134,7 @@ fn the_source_selects_the_form_and_keeps_the_settings_of_the_other() {
     );
     driver.choose_by_hand();
     driver.enter("Hidden nodes", "5");
-    driver.unfold_to("Network inputs", "Whitening");
+    driver.unfold_to("Advanced", "Whitening");
     driver.click_button("Whitening");
     driver.settle();
     let chosen = driver.state().settings();
@@ -324,7 +324,7 @@ fn row_wires_offer_a_network_for_each_and_without_them_there_is_one() {
     }
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.mean("row", "row-wire");
-    driver.unfold_to("Network inputs", "Known");
+    driver.unfold_to("Advanced", "Known");
     driver.click_button("Known");
     driver.settle();
     assert_eq!(driver.state().settings().source.row_model(), RowModel::Each);

@@ -41,8 +41,8 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
     // 90 % of the noise is within 0.09.
     assert!((coverage.half_width / 0.09 - 1.0).abs() < 0.2, "{coverage:?}");
     driver.assert_shows(&[
-        format!("x (mm), half-width ±: {}", format_number(coverage.half_width)),
-        format!("x (mm), coverage, %: {}", format_number(100.0 * coverage.share)),
+        format!("x (mm), 90 % ±: {}", format_number(coverage.half_width)),
+        format!("x (mm), holds %: {}", format_number(100.0 * coverage.share)),
     ]);
 
     // Another epoch makes them invalid; they are calibrated again at its end.
@@ -67,6 +67,7 @@ fn pausing_after_the_last_epoch_keeps_the_intervals() {
     driver.window_mut().apply(Effect::Pause);
     driver.wait_for_training();
     driver.wait_for_kept_run();
+    driver.details();
     assert!(!driver.says("No 90 % intervals"), "{:#?}", driver.texts());
     assert!(driver.kept(0).intervals.is_some());
 }
@@ -87,6 +88,7 @@ fn stopping_a_calibration_keeps_the_network_without_intervals() {
     driver.wait_for_training();
     driver.wait_for_kept_run();
     assert_ne!(driver.state().phase, Phase::Ended(StopReason::Stopped));
+    driver.details();
     assert!(driver.has("No 90 % intervals: interrupted."), "{:#?}", driver.texts());
     assert_eq!(driver.kept(0).intervals, None);
 }

@@ -8,7 +8,7 @@ use decoupler_files::export::{CheckpointFile, CheckpointPlace};
 
 use crate::{
     closing::close,
-    driver::{Driver, PATIENCE},
+    driver::{Driver, PATIENCE, small},
     folders::names,
     intervals::noisy,
     recordings::written,
@@ -177,4 +177,34 @@ fn a_training_that_ended_without_its_intervals_gets_them_when_resumed() {
     driver.wait_for_kept_run();
     assert!(driver.kept(0).intervals.is_some());
     assert_eq!(checkpoints(&kept), [""; 0]);
+}
+
+#[test]
+fn the_last_run_is_shown_after_a_restart_and_each_of_the_list_can_be_opened() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, runs) = (folder.path().join("window.json"), folder.path().join("runs"));
+    let mut driver = Driver::open_again(&file, &runs);
+    driver.configure_small();
+    driver.train();
+    driver.wait_for_kept_run();
+    let table = driver.table();
+    drop(driver);
+
+    let mut driver = Driver::open_again(&file, &runs);
+    driver.wait("the last run", |driver| driver.table() == table);
+    assert!(driver.says("Finished: "), "{:#?}", driver.texts());
+    assert!(!driver.has("Train longer"), "its state is not kept");
+    let bundle = folder.path().join("network.json");
+    driver.save("Network file, JSON", &bundle);
+    driver.wait("its network", |_| bundle.exists());
+    driver.enter("Hidden nodes", "3");
+    driver.train();
+    driver.wait("another run", |driver| driver.state().runs.workspace.runs.len() == 2);
+    assert_ne!(driver.table(), table);
+
+    driver.click_button("Compare");
+    let name = driver.state().runs.workspace.runs[0].name.clone();
+    driver.click(&format!("Open {name}"));
+    driver.wait("the first run", |driver| driver.table() == table);
+    assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));
 }

@@ -110,7 +110,7 @@ fn an_idle_window_draws_nothing() {
 fn buttons_react_to_the_pointer() {
     let mut driver = Driver::open();
     for theme in ["Light theme", "Dark theme"] {
-        for button in ["▶ Train", theme, "Best", "Open checkpoint…"] {
+        for button in ["▶ Train", theme, "Best accuracy"] {
             // Inside the edge, next to the text.
             let place = driver.get(button).rect().left_center() + vec2(3.0, 0.0);
             let colour = |driver: &mut Driver| {

@@ -43,26 +43,17 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     shows_the_baselines_of(&driver, opened);
     assert!(!driver.has("Published"), "the paper has no print");
     // A print: most of the surface is at rest, and the middle of it is pressed.
-    let depths_mm = driver
-        .views()
-        .train
-        .drawn
-        .surfaces
-        .as_ref()
-        .unwrap()
-        .actual
-        .nodes
-        .iter();
+    let depths_mm = driver.views().train.drawing().unwrap().actual.nodes.iter();
     let depths_mm: Vec<f64> = depths_mm.map(|node| 5.0 - node.z).collect();
     let at_rest = depths_mm.iter().filter(|depth_mm| **depth_mm < 0.01).count();
     let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
     assert!(at_rest > 40 && deepest_mm > 0.2, "{at_rest} at rest, {deepest_mm} mm");
 
-    driver.click("Paper's scene");
+    driver.click("Paper");
     assert_eq!(driver.state().draft, RunSettings::default());
     driver.wait("the published errors", |driver| driver.has("Published"));
     shows_the_baselines_of(&driver, RunSettings::default());
-    driver.click("Indenter's print");
+    driver.click("Press demo");
     assert_eq!(driver.state().draft, opened);
 }
 
@@ -73,8 +64,8 @@ fn only_the_papers_own_network_is_announced_to_take_seconds() {
     assert!(driver.says(SAYS));
     driver.enter("Array scale", "2x2_1x6");
     driver.wait("the small array", |driver| {
-        let test = driver.state().test();
-        test.is_some_and(|test| test.sensor.scale.rows() == 2)
+        let skin = driver.state().skin();
+        skin.is_some_and(|skin| skin.sensor.scale.rows() == 2)
     });
     driver.settle();
     assert!(driver.says("Press Train to fill in") && !driver.says(SAYS));
@@ -91,7 +82,8 @@ fn nouns_after_one_are_singular() {
     );
     driver.enter("Hidden nodes", "1");
     driver.wait("the array", |driver| driver.says("1 unknown, 1 equation per frame"));
-    driver.wait("its readings", |driver| driver.says("1 row-wire × 1 column-wire"));
+    driver.act("Chart: Readings");
+    driver.wait("its readings", |driver| driver.has("Readings of the actual surface"));
     let texts = driver.texts();
     let plural = |text: &&String| {
         let words: Vec<&str> = text.split_whitespace().collect();
@@ -193,22 +185,22 @@ fn empty_views_fill_on_a_click() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.click_button("Compare");
-    assert!(driver.is_enabled("Train a network now"));
+    assert!(driver.says("Every finished training is kept here"));
     driver.click_button("Study");
     driver.settle();
-    assert!(driver.is_enabled("Run now"));
+    assert!(driver.is_enabled("▶ Run"));
     driver.click("Speed against accuracy");
     driver.settle();
-    assert!(driver.is_enabled("Measure now"));
+    assert!(driver.is_enabled("▶ Run"));
     driver.click_button("Train");
     driver.settle();
-    driver.click_button("Train now");
+    driver.click("▶ Train");
     driver.wait("the end of the training", |driver| {
         matches!(driver.state().phase, Phase::Ended(_))
     });
     driver.click_button("Study");
     driver.click("Table 1");
-    driver.click_button("Run now");
+    driver.click_button("▶ Run");
     driver.wait("the experiment", |driver| driver.is_enabled("■ Cancel"));
     driver.click("■ Cancel");
 }

@@ -77,7 +77,7 @@ fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
     driver.click("Nodes");
     driver.settle();
     let plot = plot_place(&mut driver, "z (mm) against node");
-    let drawn = driver.views().train.drawn.surfaces.as_ref().unwrap();
+    let drawn = driver.views().train.drawing().unwrap();
     let (nodes, count) = (drawn.actual.nodes.len(), 60);
     assert_eq!(nodes, count, "10 × 6");
     // Across the plot at all heights: the path crosses some points, and gaps between them.
@@ -125,6 +125,7 @@ fn a_section_follows_keys_clicks_and_the_readings_and_is_exported() {
     assert!(words(&mut driver).contains("x along column-wire"));
     driver.click_button("Row-wire");
     // A click on the map of readings chooses its wires: the last row.
+    driver.act("Chart: Readings");
     let readings = driver.get("Readings of the actual surface").rect();
     driver.harness().drag_at(readings.left_bottom() + vec2(12.0, -4.0));
     driver.harness().drop_at(readings.left_bottom() + vec2(12.0, -4.0));

@@ -106,7 +106,7 @@ impl Driver {
     #[track_caller]
     pub(crate) fn limit_epochs(&mut self, epochs: &str) {
         self.choose_by_hand();
-        self.unfold_to("When to stop", "Epochs");
+        self.unfold_to("Advanced", "Epochs");
         self.enter("Epochs", epochs);
     }
 }

@@ -3,9 +3,12 @@
 use std::{fs, path::PathBuf};
 
 use decoupler::window::Phase;
-use decoupler_core::{evaluation::RunSettings, scene::Loading};
+use decoupler_core::{
+    evaluation::RunSettings,
+    scene::{Loading, Noise},
+};
 
-use eframe::egui::{Vec2, vec2};
+use eframe::egui::{Pos2, Vec2, vec2};
 
 use crate::driver::{Driver, small};
 
@@ -16,10 +19,11 @@ fn file() -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// The paper's settings except for the loading.
+/// The paper's settings except for loading and noise.
 fn is_a_print(settings: &RunSettings) -> bool {
     let mut papers = *settings;
-    papers.simulation_mut().unwrap().scene.loading = Loading::RandomNodes;
+    let scene = &mut papers.simulation_mut().unwrap().scene;
+    (scene.loading, scene.noise) = (Loading::RandomNodes, Noise::default());
     papers == RunSettings::default() && matches!(settings.simulation().unwrap().scene.loading, Loading::Indenter(_))
 }
 
@@ -30,7 +34,7 @@ fn theme_view_and_settings_are_restored_and_nothing_is_trained() {
     assert!(is_a_print(&driver.state().draft), "the first start");
     assert!(driver.state().look.is_dark && driver.shown() == "Train");
     driver.configure_small();
-    driver.click("Light theme");
+    driver.act("Light theme");
     driver.click_button("Compare");
     assert_eq!(driver.shown(), "Compare");
     drop(driver);
@@ -99,7 +103,7 @@ fn an_unwritable_location_is_reported_once() {
     let mut driver = Driver::open_remembering(&path);
     driver.wait("the reason", |driver| driver.says("will not be restored"));
     driver.click("Dismiss");
-    driver.click("Light theme");
+    driver.act("Light theme");
     driver.settle();
     assert_eq!(driver.notice(), None);
 }
@@ -113,9 +117,17 @@ fn a_window_that_remembers_becomes_idle() {
     assert!(driver.becomes_idle());
 }
 
-/// Drags the edge of a column by this many points.
-fn drag(driver: &mut Driver, edge: &str, points: f32) {
-    let from = driver.get(edge).rect().center();
+/// Returns the edges of the columns on the left and on the right.
+fn edges(driver: &Driver) -> [Pos2; 2] {
+    let places = driver.places().into_iter();
+    let edges = places.filter(|(label, _)| label == "Resize panel");
+    let mut edges = Vec::from_iter(edges.map(|(_, edge)| edge.center()));
+    edges.sort_by(|one, other| one.x.total_cmp(&other.x));
+    edges.try_into().unwrap()
+}
+
+/// Drags an edge of a column by this many points.
+fn drag(driver: &mut Driver, from: Pos2, points: f32) {
     let harness = driver.harness();
     harness.drag_at(from);
     harness.step();
@@ -135,27 +147,31 @@ fn middle(driver: &Driver) -> (f32, Vec2) {
 
 #[test]
 fn dragged_column_widths_are_remembered() {
-    const LEFT: &str = "Width of the left column";
-    const RIGHT: &str = "Width of the right column";
     let (_folder, path) = file();
+    // Wide enough for two columns.
+    let wide = vec2(1800.0, 900.0);
     let mut driver = Driver::open_remembering(&path);
-    let edges = |driver: &Driver| [LEFT, RIGHT].map(|edge| driver.get(edge).rect().center().x);
+    driver.harness().set_size(wide);
+    driver.settle();
     let usual = edges(&driver);
-    drag(&mut driver, LEFT, 40.0);
-    drag(&mut driver, RIGHT, 30.0);
+    drag(&mut driver, usual[0], 40.0);
+    drag(&mut driver, usual[1], 30.0);
     let drawn = edges(&driver);
-    assert!((drawn[0] - usual[0] - 40.0).abs() < 5.0, "{usual:?}, {drawn:?}");
-    assert!((drawn[1] - usual[1] - 30.0).abs() < 5.0, "{usual:?}, {drawn:?}");
+    assert!((drawn[0].x - usual[0].x - 40.0).abs() < 5.0, "{usual:?}, {drawn:?}");
+    assert!((drawn[1].x - usual[1].x - 30.0).abs() < 5.0, "{usual:?}, {drawn:?}");
     assert!(driver.becomes_idle());
     let seen = middle(&driver);
     drop(driver);
 
     let mut driver = Driver::open_remembering(&path);
+    driver.harness().set_size(wide);
+    driver.settle();
     assert_eq!((edges(&driver), middle(&driver)), (drawn, seen));
     // No further than the surfaces allow.
-    drag(&mut driver, LEFT, 900.0);
-    drag(&mut driver, RIGHT, -900.0);
+    drag(&mut driver, drawn[0], 900.0);
+    drag(&mut driver, drawn[1], -900.0);
     assert!(middle(&driver).1.x >= 280.0, "{:?}", middle(&driver));
-    drag(&mut driver, LEFT, -900.0);
-    assert!(edges(&driver)[0] >= 240.0, "{:?}", edges(&driver));
+    let [left, _] = edges(&driver);
+    drag(&mut driver, left, -900.0);
+    assert!(edges(&driver)[0].x >= 240.0, "{:?}", edges(&driver));
 }

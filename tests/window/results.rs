@@ -57,6 +57,12 @@ fn a_training_shows_the_same_errors_as_the_library() {
 #[test]
 fn targets_with_positions_are_shown_as_surfaces() {
     let Opened { mut driver, folder, .. } = trained_on(|folder| skin_with_positions(folder, GRID));
+    assert!(
+        driver.has("d1 (mm) against time (s): 90 % interval, actual, decoded"),
+        "all targets over time first"
+    );
+    driver.click("Surfaces");
+    driver.settle();
     // The first of the last 12 samples: d1 is the lowest and d6 the highest, or the other way round.
     let of_sample = |row: f64| {
         let (u, v) = ((0.37 * row).sin(), (0.23 * row).cos());
@@ -85,9 +91,6 @@ fn targets_with_positions_are_shown_as_surfaces() {
     let picture = folder.path().join("surfaces.svg");
     driver.save("Surfaces, SVG", &picture);
     assert!(fs::read_to_string(&picture).unwrap().contains("value (mm)"));
-    driver.click("Sample");
-    driver.settle();
-    assert!(driver.says("% of the target's range"), "all targets are there too");
 }
 
 #[test]
@@ -95,6 +98,8 @@ fn scattered_positions_have_surfaces_and_positions_on_a_line_say_why_not() {
     // A hexagon around d6.
     let hexagon = "target,x,y\nd1,5,0\nd2,2.5,4.33\nd3,-2.5,4.33\nd4,-5,0\nd5,-2.5,-4.33\nd6,0,0\n";
     let Opened { mut driver, folder, .. } = trained_on(|folder| skin_with_positions(folder, hexagon));
+    driver.click("Surfaces");
+    driver.settle();
     assert!(range(&driver, "Decoded").starts_with("value "));
     driver.click("Top view");
     driver.settle();
@@ -111,17 +116,26 @@ fn scattered_positions_have_surfaces_and_positions_on_a_line_say_why_not() {
     } = trained_on(|folder| skin_with_positions(folder, oblique));
     assert!(!driver.has("Actual surface"));
     assert!(driver.says("No surface goes through the positions of the targets: all nodes are on one line"));
-    assert!(driver.says("% of the target's range"), "all targets are shown instead");
+    assert!(
+        driver.says("d1 (mm) against time (s)"),
+        "all targets are shown over time"
+    );
 }
 
 #[test]
-fn without_positions_all_targets_of_the_sample_are_shown_and_errors_over_a_position() {
+fn without_positions_all_targets_are_shown_over_time_and_errors_over_a_position() {
     let Opened {
         mut driver,
         folder: _folder,
         ..
     } = trained_on(probe);
-    assert!(driver.has("Test sample 1") && driver.says("value (mm)"));
+    for target in ["x (mm)", "y (mm)"] {
+        assert!(
+            driver.says(&format!("{target} against time (s)")),
+            "{:#?}",
+            driver.texts()
+        );
+    }
     driver.click("Error map");
     driver.settle();
     assert!(driver.has("Error over the position"));
@@ -161,13 +175,13 @@ fn hover(driver: &mut Driver, place: eframe::egui::Rect, holds: impl Fn(&Driver)
 }
 
 #[test]
-fn a_target_lit_on_a_surface_is_lit_in_the_sample_and_named() {
+fn a_target_lit_on_a_surface_is_named() {
     let Opened {
         mut driver,
         folder: _folder,
         ..
     } = trained_on(|folder| skin_with_positions(folder, GRID));
-    driver.click("Sample");
+    driver.click("Surfaces");
     driver.settle();
     let surface = driver.get("Actual surface").rect();
     hover(&mut driver, surface, |driver| {
@@ -186,11 +200,9 @@ fn a_target_lit_on_a_surface_is_lit_in_the_sample_and_named() {
 
 /// Returns true for a heading or cell of the error table of a recording.
 fn is_of_error_table(text: &str) -> bool {
-    let is_cell = ["training mean, ", "ridge, ", "network, "]
-        .iter()
-        .any(|name| text.contains(name));
-    let is_heading = ["RMSE", "MAE", "R²", "worst", "% of range"].contains(&text);
-    is_cell || is_heading || text == "all targets (mm)"
+    const HEADINGS: [&str; 6] = ["network", "ridge", "mean", "R²", "90 % ±", "holds %"];
+    let is_cell = HEADINGS.iter().any(|heading| text.contains(&format!(", {heading}: ")));
+    is_cell || HEADINGS.contains(&text) || text == "all targets (mm)"
 }
 
 #[test]
@@ -222,4 +234,158 @@ fn results_of_a_recording_fit_in_narrow_windows_too() {
             assert!(place.height() < 40.0, "at {size}, '{text}' is at {place:?}");
         }
     }
+}
+
+#[test]
+fn another_file_is_decoded_next_to_it_and_test_predictions_are_saved() {
+    let Opened {
+        mut driver,
+        setup,
+        folder,
+    } = trained_small(SourceKind::Recording);
+    let other = folder.path().join("other.csv");
+    fs::write(&other, "time (s),u1 (V),u2 (V)\n0.5,2.1,0.3\n0.6,2.2,-0.4\n").unwrap();
+    driver.act("Decode file");
+    driver.type_into("File", &other.display().to_string());
+    driver.click_button("Open");
+    let decoded = folder.path().join("other-decoded.csv");
+    driver.wait("the decoded file", |driver| {
+        driver.says(&format!("Saved {}", decoded.display()))
+    });
+    let run = run_of(&setup);
+    let mut rows = csv::Reader::from_path(&decoded).unwrap();
+    let headings = rows.headers().unwrap().clone();
+    let place = |name: &str| headings.iter().position(|heading| heading == name).unwrap();
+    let (time, x, y) = (place("time (s)"), place("x (mm)"), place("y (mm)"));
+    assert!(
+        headings.iter().any(|heading| heading == "x_half_width_90 (mm)"),
+        "{headings:?}"
+    );
+    let rows = Vec::from_iter(rows.records().map(Result::unwrap));
+    let readings = ndarray::array![[2.1, 0.3], [2.2, -0.4]];
+    let set =
+        decoupler_core::dataset::Dataset::new(readings, ndarray::Array2::zeros((2, 2)), None, vec![0, 1]).unwrap();
+    let answers = decoupler_core::decoupling::ProgramDecoder::new(run.program()).answers_to(&set);
+    for (row, answers) in rows.iter().zip(answers.rows()) {
+        assert_eq!(
+            [x, y].map(|place| row[place].parse::<f64>().unwrap()),
+            [answers[0], answers[1]]
+        );
+    }
+    assert_eq!((&rows[0][time], rows.len()), ("0.5", 2));
+
+    let predictions = folder.path().join("predictions.csv");
+    driver.save("Test predictions, CSV", &predictions);
+    let mut rows = csv::Reader::from_path(&predictions).unwrap();
+    let headings = rows.headers().unwrap().clone();
+    assert_eq!(
+        headings.iter().take(4).collect::<Vec<_>>(),
+        ["sample", "x_actual (mm)", "x_decoded (mm)", "x_half_width_90 (mm)"]
+    );
+    let rows = Vec::from_iter(rows.records().map(Result::unwrap));
+    assert_eq!(rows.len(), run.test().samples());
+    assert_eq!(rows[3][2].parse(), Ok(run.decouple_test()[[3, 0]]));
+}
+
+#[test]
+fn ridge_takes_the_place_of_a_network_that_is_worse() {
+    let Opened {
+        mut driver,
+        folder: _folder,
+        ..
+    } = trained_small(SourceKind::Recording);
+    assert!(driver.says("The network is worse than ridge regression"));
+    let errors = |driver: &Driver| {
+        Vec::from_iter(
+            driver
+                .state()
+                .result()
+                .unwrap()
+                .errors
+                .targets()
+                .iter()
+                .map(|of| of.rmse),
+        )
+    };
+    let ridge = Vec::from_iter(
+        driver
+            .state()
+            .run
+            .as_ref()
+            .unwrap()
+            .baselines
+            .linear
+            .targets()
+            .iter()
+            .map(|of| of.rmse),
+    );
+    assert!(errors(&driver)[0] > ridge[0]);
+    driver.click("Use ridge");
+    driver.wait("its answers", |driver| {
+        driver.state().result().unwrap().network_alone.is_some()
+    });
+    driver.settle();
+    for (chosen, ridge) in errors(&driver).into_iter().zip(ridge) {
+        assert!((chosen / ridge - 1.0).abs() < 1e-6, "{chosen} {ridge}");
+    }
+    assert!(driver.says("x (mm), chosen: ") && !driver.says("The network is worse than ridge regression"));
+    assert!(
+        driver.state().result().unwrap().intervals.is_some(),
+        "they are those of ridge"
+    );
+}
+
+#[test]
+fn a_result_of_other_settings_stays_and_that_of_another_recording_does_not() {
+    let Opened {
+        mut driver,
+        setup,
+        folder,
+    } = trained_small(SourceKind::Recording);
+    driver.enter("Hidden nodes", "7");
+    assert!(driver.has("Result of the previous settings.") && driver.says("x (mm) against time (s)"));
+    driver.click("Undo changes");
+    assert!(!driver.has("Result of the previous settings."));
+    assert_eq!(driver.state().setup().as_ref(), Ok(&setup));
+    driver.take_recording(&force(folder.path()));
+    assert!(!driver.says("x (mm) against time (s)") && !driver.says("Finished: "));
+    assert!(driver.has("Ready: press Train"));
+}
+
+#[test]
+fn the_wheel_zooms_the_values_over_time_and_a_click_goes_to_a_sample() {
+    let Opened {
+        mut driver,
+        folder: _folder,
+        ..
+    } = trained_on(probe);
+    let x = driver
+        .texts()
+        .into_iter()
+        .find(|text| text.starts_with("x (mm) against time (s): "));
+    let x = &*x.unwrap();
+    let whole = driver.get(x).accesskit_node().description().unwrap();
+    let middle = driver.get(x).rect().center();
+    driver.harness().hover_at(middle);
+    driver.harness().run_steps(2);
+    assert!(
+        driver.texts().iter().any(|text| text.contains("x (mm): actual ")),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.harness().drag_at(middle);
+    driver.harness().drop_at(middle);
+    driver.settle();
+    let sample = driver.views().train.snapshot;
+    assert!((8..=16).contains(&sample), "{sample}");
+    driver.harness().event(eframe::egui::Event::MouseWheel {
+        unit: eframe::egui::MouseWheelUnit::Point,
+        delta: vec2(0.0, 200.0),
+        modifiers: eframe::egui::Modifiers::NONE,
+        phase: eframe::egui::TouchPhase::Move,
+        source: eframe::egui::MouseWheelSource::Wheel,
+    });
+    driver.settle();
+    let seen = driver.get(x).accesskit_node().description().unwrap();
+    assert_ne!(seen, whole, "fewer samples are in view");
 }

@@ -9,8 +9,9 @@ use crate::{
 
 const SLIDER: &str = "Epoch of the displayed network";
 
-fn pairs(driver: &Driver) -> Vec<(f64, f64)> {
-    driver.views().train.drawn.pairs().unwrap().to_vec()
+fn answers(driver: &Driver) -> Vec<f64> {
+    let result = driver.views().train.result(driver.state()).unwrap();
+    result.answers.iter().copied().collect()
 }
 
 #[test]
@@ -21,7 +22,7 @@ fn the_network_of_an_epoch_equals_that_of_a_training_stopped_there() {
             setup,
             folder: _folder,
         } = trained_small(source);
-        let of_latest = pairs(&driver);
+        let of_latest = answers(&driver);
         let last = driver.epochs();
         assert!(
             driver.has(&format!("Latest, epoch {last}")) && !driver.is_enabled("Latest"),
@@ -46,13 +47,13 @@ fn the_network_of_an_epoch_equals_that_of_a_training_stopped_there() {
             driver.assert_shows(&network_figures(&run));
             assert!(driver.has(&format!("Network of epoch {epoch}")));
             if epoch < 5 {
-                assert_ne!(pairs(&driver), of_latest, "{source:?}: the histogram follows");
+                assert_ne!(answers(&driver), of_latest, "{source:?}");
             }
         }
         driver.click_button("Latest");
         driver.settle();
         driver.assert_shows(&network_figures(&run_of(&setup)));
-        assert_eq!(pairs(&driver), of_latest);
+        assert_eq!(answers(&driver), of_latest);
     }
 }
 

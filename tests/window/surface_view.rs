@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use decoupler::window::surface_view::{ColourBar, SurfaceView};
+use decoupler::window::surface_view::{SurfaceView, colour_bar_ui};
 use decoupler::window::theme::{self, Theme};
 use decoupler_core::surface::SurfaceMap;
 use decoupler_files::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
@@ -83,19 +83,25 @@ impl Skin {
     }
 }
 
-fn view<'a>(surface: &'a Surface, theme: &'a Theme) -> SurfaceView<'a> {
+/// A figure without surfaces of its own, seen by `camera`.
+fn seen_by(camera: OrbitCamera) -> SurfaceFigure {
+    SurfaceFigure {
+        camera,
+        ..SurfaceFigure::default()
+    }
+}
+
+fn view<'a>(surface: &'a Surface, figure: &'a SurfaceFigure) -> SurfaceView<'a> {
     SurfaceView {
         label: "Actual surface",
         surface,
-        marked_node: None,
-        lit_nodes: &[],
-        section: None,
-        theme,
+        figure,
+        is_touched: false,
     }
 }
 
 fn theme_of(is_dark: bool) -> &'static Theme {
-    if is_dark { Theme::dark() } else { Theme::light() }
+    Theme::get(is_dark)
 }
 
 fn harness<'a>(size: Vec2, is_dark: bool, app: impl FnMut(&mut egui::Ui) + 'a) -> Harness<'a> {
@@ -111,7 +117,7 @@ fn the_surface_is_found_by_its_label_and_turned_by_keys() {
     let surface = Skin::pressed(10, 10).surface("Actual", Quantity::Height, ViewMode::ThreeD);
     let camera = std::cell::Cell::new(OrbitCamera::default());
     let mut harness = harness(vec2(350.0, 540.0), true, |ui| {
-        camera.set(view(&surface, Theme::dark()).show(ui, camera.get()).camera);
+        camera.set(view(&surface, &seen_by(camera.get())).show(ui).camera);
     });
     harness.get_by_label("Actual surface").focus();
     harness.run();
@@ -137,7 +143,7 @@ fn dragging_turns_and_hovering_finds_a_node() {
     let camera = std::cell::Cell::new(OrbitCamera::default());
     let hovered = std::cell::Cell::new(None);
     let mut harness = harness(vec2(480.0, 420.0), true, |ui| {
-        let shown = view(&surface, Theme::dark()).show(ui, camera.get());
+        let shown = view(&surface, &seen_by(camera.get())).show(ui);
         shown.node_tooltip_ui(|ui, node| {
             ui.label(format!("node {node}"));
         });
@@ -182,7 +188,7 @@ fn odd_inputs_are_drawn() {
                 };
                 for size in [vec2(350.0, 540.0), vec2(70.0, 70.0), vec2(10.0, 10.0)] {
                     let mut harness = harness(size, false, |ui| {
-                        view(&surface, Theme::light()).show(ui, OrbitCamera::default());
+                        view(&surface, &SurfaceFigure::default()).show(ui);
                     });
                     harness.run();
                 }
@@ -195,7 +201,7 @@ fn odd_inputs_are_drawn() {
 fn nothing_is_repainted_while_nothing_changes() {
     let surface = Skin::pressed(10, 10).surface("Actual", Quantity::Height, ViewMode::ThreeD);
     let mut harness = harness(vec2(350.0, 540.0), true, |ui| {
-        view(&surface, Theme::dark()).show(ui, OrbitCamera::default());
+        view(&surface, &SurfaceFigure::default()).show(ui);
     });
     assert!(harness.run() <= 2);
 }
@@ -240,7 +246,7 @@ fn gallery() {
                 let theme = theme_of(is_dark);
                 let mut harness = harness(vec2(860.0, 360.0), is_dark, |ui| {
                     let filled = egui::Frame::new().fill(theme.palette.panel);
-                    filled.show(ui, |ui| show_figure(ui, &figure, theme));
+                    filled.show(ui, |ui| show_figure(ui, &figure));
                 });
                 harness.run();
                 let renderer = if is_dark { "dark" } else { "light" };
@@ -288,23 +294,21 @@ fn shown(skin: &Skin, marked_node: Option<usize>, camera: OrbitCamera) -> Surfac
     }
 }
 
-fn show_figure(ui: &mut egui::Ui, figure: &SurfaceFigure, theme: &Theme) {
+fn show_figure(ui: &mut egui::Ui, figure: &SurfaceFigure) {
     ui.spacing_mut().item_spacing = Vec2::ZERO;
     ui.horizontal_top(|ui| {
         for surface in &figure.surfaces {
             ui.allocate_ui(vec2(350.0, 350.0), |ui| {
-                let (label, marked_node) = (surface.title.as_str(), figure.marked_node);
-                let view = view(surface, theme);
+                let label = surface.title.as_str();
                 SurfaceView {
                     label,
-                    marked_node,
-                    ..view
+                    ..view(surface, figure)
                 }
-                .show(ui, figure.camera);
+                .show(ui);
             });
         }
         for scale in &figure.scales() {
-            ColourBar { scale, theme }.show(ui, 300.0);
+            colour_bar_ui(ui, scale, 300.0);
         }
     });
 }

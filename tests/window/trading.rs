@@ -33,19 +33,18 @@ fn open() -> Driver {
 
 /// Ridge, Newton and small networks of both presets at two levels of noise.
 pub(crate) fn tiny(driver: &mut Driver) {
-    driver.type_into("Noise levels", "0, 1e-3");
+    driver.type_into("Noise levels (%)", "0, 0.1");
     driver.type_into("Hidden nodes", "3");
     for decoder in ["Training mean", "Radial basis", "Fuzzy rules", "Network + Newton"] {
         driver.click(decoder);
     }
     driver.enter("Maximum samples", "100");
     driver.enter("Maximum epochs", "3");
-    driver.enter("Test samples", "20");
     assert!(driver.has("16 points"), "{:#?}", driver.texts());
 }
 
 pub(crate) fn measure(driver: &mut Driver) {
-    driver.click("▶ Measure");
+    driver.click("▶ Run");
     wait_for_the_end(driver);
 }
 
@@ -69,7 +68,7 @@ fn settings(draft: &RunSettings, preset: Preset, noise: f64) -> RunSettings {
         },
         samples: 100,
         validation_samples: of_preset.validation_samples.min(20),
-        test_samples: 20,
+        test_samples: array.test_samples,
     }
     .into();
     settings
@@ -148,13 +147,11 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
         "Newton, best preset",
         "Network f32, best preset, 3 hidden",
     ] {
-        for chart in ["Decoding", "Training"] {
-            let point = format!("{chart}: {name}");
-            assert!(driver.has(&point), "{point}: {:#?}", driver.texts());
-        }
+        let point = format!("Point {name}");
+        assert!(driver.has(&point), "{point}: {:#?}", driver.texts());
     }
 
-    driver.click_button("0.001");
+    driver.click_button("0.1 %");
     driver.settle();
     driver.enter("Fastest under", "1e9");
     driver.enter("Most accurate under", "1e9");
@@ -169,7 +166,7 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
     assert!(text.contains(&point_name(best)) && text.contains(&percent), "{text}");
     assert!(fastest_under(&points, 1e9).is_some());
     assert!(!driver.is_enabled(OPEN), "nothing is marked");
-    driver.click(&text);
+    driver.click(&format!("Point {}", point_name(best)));
     driver.enter("Fastest under", "1e-12");
     assert!(driver.has("No measured decoder is this accurate."));
     driver.click(OPEN);
@@ -177,15 +174,15 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
 }
 
 #[test]
-fn a_click_on_a_point_opens_its_configuration() {
+fn a_marked_point_opens_its_configuration() {
     let mut driver = open();
     tiny(&mut driver);
     measure(&mut driver);
     let before = driver.state().draft;
     driver.click("Point Newton, paper preset");
-    assert!(driver.has("MARKED POINT"), "a row of the table marks its point");
-    assert_eq!(driver.shown(), "Study");
-    driver.click("Decoding: Ridge, best preset");
+    assert_eq!(driver.shown(), "Study", "a click only marks");
+    driver.click("Point Ridge, best preset");
+    driver.click(OPEN);
     assert_eq!(driver.shown(), "Train");
     assert_eq!(driver.state().draft, settings(&before, Preset::Best, 0.0));
 }
@@ -195,7 +192,6 @@ fn measurements_are_saved_as_tables_and_figures() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open();
     tiny(&mut driver);
-    assert!(driver.has("Measure now"));
     measure(&mut driver);
     let saved = [
         ("All points, CSV", "points.csv", &b"noise,preset,decoder"[..]),
@@ -236,15 +232,15 @@ fn a_measurement_shows_its_points_as_they_arrive_and_can_be_cancelled() {
     driver.type_into("Hidden nodes", &sizes.join(" "));
     driver.enter("Maximum samples", "2000");
     driver.enter("Maximum epochs", "200");
-    driver.click("▶ Measure");
+    driver.click("▶ Run");
     driver.wait("the first points", |driver| {
-        driver.has("Decoding: Network, paper preset, 3 hidden")
+        driver.has("Point Network, paper preset, 3 hidden")
     });
-    assert!(driver.has("Decoding: Ridge, paper preset"));
-    assert!(!driver.is_enabled("▶ Measure"), "one measurement at a time");
+    assert!(driver.has("Point Ridge, paper preset"));
+    assert!(!driver.is_enabled("▶ Run"), "one measurement at a time");
     driver.click("■ Cancel");
     assert!(
-        driver.is_enabled("▶ Measure"),
+        driver.is_enabled("▶ Run"),
         "cancelling does not wait for the current point"
     );
     assert!(
@@ -274,10 +270,10 @@ fn a_measurement_waits_while_a_training_would_distort_its_times() {
     driver.click_button("Train");
     driver.click("▶ Train");
     driver.click_button("Study");
-    driver.click("▶ Measure");
+    driver.click("▶ Run");
     driver.wait("the note", |driver| driver.says("would distort the times"));
     driver.harness().run_steps(20);
-    assert!(!driver.has("Decoding: Ridge, paper preset"), "nothing is measured");
+    assert!(!driver.has("Point Ridge, paper preset"), "nothing is measured");
     driver.click_button("Train");
     driver.click("■ Stop");
     driver.settle();
@@ -294,14 +290,14 @@ fn a_measurement_waits_while_a_training_would_distort_its_times() {
 #[test]
 fn an_invalid_plan_says_why() {
     let mut driver = open();
-    driver.type_into("Noise levels", "0, much");
+    driver.type_into("Noise levels (%)", "0, much");
     assert!(driver.says("'much' is not a number"), "{:#?}", driver.texts());
-    assert!(!driver.is_enabled("▶ Measure"));
-    driver.type_into("Noise levels", "0");
+    assert!(!driver.is_enabled("▶ Run"));
+    driver.type_into("Noise levels (%)", "0");
     driver.type_into("Hidden nodes", "0");
     assert!(driver.says("hidden nodes: 0 is not possible"), "{:#?}", driver.texts());
     driver.type_into("Hidden nodes", "3");
-    assert!(driver.is_enabled("▶ Measure"));
+    assert!(driver.is_enabled("▶ Run"));
 }
 
 #[test]
@@ -314,13 +310,13 @@ fn charts_and_form_fit_in_a_narrow_window() {
     measure(&mut driver);
     driver.settle();
     assert!(driver.get("Export").rect().max.x < 1024.0);
-    for label in ["▶ Measure", "■ Cancel", "Maximum samples"] {
+    for label in ["▶ Run", "■ Cancel", "Maximum samples"] {
         for (_, rect) in driver.places().into_iter().filter(|(text, _)| text == label) {
             assert!(rect.max.x < 272.0, "{label}: {rect}");
         }
     }
     for (text, rect) in driver.places() {
-        if text.starts_with("Decoding: ") || text.starts_with("Training: ") {
+        if text.starts_with("Point ") {
             assert!(rect.max.x < 1024.0 && rect.min.x > 272.0, "{text}: {rect}");
         }
     }
@@ -341,7 +337,7 @@ fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_opened() {
     }
     driver.enter("Maximum epochs", "3");
     assert!(
-        !driver.has("Newton") && !driver.has("Noise levels"),
+        !driver.has("Newton") && !driver.has("Noise levels (%)"),
         "{:#?}",
         driver.texts()
     );
@@ -350,7 +346,7 @@ fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_opened() {
     measure(&mut driver);
     assert!(driver.says("finished: 6 points in "), "{:#?}", driver.texts());
     for name in ["Ridge", "Network, lm, 3 hidden", "Network f32, br, 3 hidden"] {
-        let point = format!("Decoding: {name}");
+        let point = format!("Point {name}");
         assert!(driver.has(&point), "{name}: {:#?}", driver.texts());
     }
     let table = folder.path().join("points.csv");
@@ -373,7 +369,8 @@ fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_opened() {
         );
     }
 
-    driver.click("Decoding: Network, lm, 3 hidden");
+    driver.click("Point Network, lm, 3 hidden");
+    driver.click(OPEN);
     assert_eq!(driver.shown(), "Train");
     let loaded = driver.state().recording.settings;
     assert_eq!((loaded.hidden, loaded.training.method.short_name()), (3, "lm"));
@@ -410,9 +407,8 @@ fn the_decoder_of_the_marked_point_is_exported() {
         driver.click_button("Study");
         driver.click(TOPIC);
         if source == SourceKind::Array {
-            driver.type_into("Noise levels", "1e-3");
+            driver.type_into("Noise levels (%)", "0.1");
             driver.enter("Maximum samples", "100");
-            driver.enter("Test samples", "20");
         }
         driver.type_into("Hidden nodes", "3");
         driver.enter("Maximum epochs", "3");

@@ -19,11 +19,11 @@ use decoupler_core::{
 use decoupler_files::{
     export::{NetworkFile, report::RunReport},
     figure::{
-        Decoded, Figure, RegressionLine, TradeOffLevel, TradeOffLimits, compared_losses_figure, experiment_figure,
-        histogram_figure, loss_figure, node_figure, position_error_map, readings_figure, regression_figure,
-        sample_figure, section_figure, singular_values_figure,
+        Decoded, Figure, PlotAxis, RegressionLine, TimeSeries, TradeOffLevel, TradeOffLimits, compared_losses_figure,
+        experiment_figure, histogram_figure, loss_figure, node_figure, position_error_map, readings_figure,
+        regression_figure, section_figure, singular_values_figure,
         surface::{Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode},
-        targets_over_time_figure, trade_off_figure, training_state_figure, value_pairs,
+        trade_off_figure, training_state_figure, value_pairs,
     },
     import::Setup,
 };
@@ -64,7 +64,7 @@ fn main() {
     draw("compared", compared_losses_figure(runs));
     let decoupled = run.decouple_test();
     let pairs = value_pairs(run.test(), &decoupled, None);
-    draw("histogram", histogram_figure(&pairs, Some(22), Decoded::Nodes));
+    draw("histogram", histogram_figure(&pairs, Decoded::Nodes));
     let line = RegressionLine::of(pairs.iter().copied());
     let regression = regression_figure((pairs.len(), &|pair| pairs[pair]), &line, Decoded::Nodes);
     draw("regression", regression);
@@ -186,25 +186,20 @@ fn main() {
     );
 
     let channels = ["x", "y", "force"].map(|name| Channel::new(name, Some(if name == "force" { "N" } else { "mm" })));
-    let ranges = [(0.0, 10.0); 3];
-    draw(
-        "sample",
-        sample_figure(&channels, &[2.0, 7.0, 4.0], &[2.5, 6.5, 4.2], &ranges),
-    );
-    let moments = (0..200).map(|at| 0.05 * f64::from(at));
-    let history: Vec<(f64, Arc<[f64]>)> = moments
-        .map(|time| {
-            (
-                time,
-                Arc::from([
-                    time.sin(),
-                    if time > 5.0 && time < 6.0 { f64::NAN } else { time.cos() },
-                    time,
-                ]),
-            )
-        })
-        .collect();
-    draw("over-time", targets_over_time_figure(&channels, &history, None));
+    let values = Array2::from_shape_fn((200, 3), |(sample, target)| {
+        (0.05 * sample as f64 + target as f64).sin()
+    });
+    let actual = &values + 0.1;
+    let series = TimeSeries {
+        targets: &channels,
+        axis: PlotAxis::linear("time (s)"),
+        places: &Vec::from_iter((0..200).map(|at| 0.05 * f64::from(at))),
+        gaps: &[100],
+        decoded: values.view(),
+        actual: Some(actual.view()),
+        intervals: None,
+    };
+    draw("over-time", series.figure(0..3, &(0.0..=10.0)));
     let targets = Array2::from_shape_fn((900, 2), |(sample, axis)| [sample % 30, sample / 30][axis] as f64 / 3.0);
     let answers = targets.mapv(|value| value + 0.3 * (value * 2.0).sin());
     let of_positions = position_error_map(targets.view(), answers.view(), ["x", "y"], Some("mm"));

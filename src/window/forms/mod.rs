@@ -7,27 +7,31 @@ mod scene;
 mod sensor;
 mod training;
 
-pub use network::{hidden_ui, inputs_ui, of_inputs, workload_ui};
-pub use presets::{follow_preset, preset_ui, scene_choice_ui};
+pub use network::{hidden_ui, workload_ui};
+pub use presets::{follow_preset, preset_between, preset_ui};
 pub use scene::{SAMPLES, of_samples, of_scene, scene_ui, size_ui};
-pub use sensor::{array_ui, geometry_ui, of_geometry};
-pub use training::{method_ui, training_ui};
+pub use sensor::{array_ui, geometry_ui};
+pub use training::method_ui;
 
 use std::{collections::HashMap, sync::LazyLock};
 
 use decoupler_core::{
-    evaluation::{RUN_OPTIONS, RunSettings},
+    evaluation::{RUN_OPTIONS, RunSettings, TrainingSize},
     scene::RowModel,
     settings::{Field, Kind, Setting, Value},
+    text::counted,
 };
-use eframe::egui::{Align, Align2, ComboBox, TextEdit, Ui, vec2};
+use eframe::egui::{Align, Align2, TextEdit, Ui, vec2};
 
 use super::{
     glossary,
     theme::space,
-    widgets::fields::{
-        capitalised, count_ui, field_ui, in_percent, input_text, list_ui, options_ui, percent_ui, quantity_ui, seed_ui,
-        usually,
+    widgets::{
+        fields::{
+            capitalised, combo_ui, count_ui, field_ui, in_percent, input_text, list_ui, options_ui, percent_ui,
+            quantity_ui, seed_ui, usually,
+        },
+        fold_ui,
     },
 };
 
@@ -70,7 +74,7 @@ pub enum Look {
 }
 
 /// Value of a setting in the table, and its text in the window.
-type Choice = (&'static str, &'static str);
+pub type Choice = (&'static str, &'static str);
 
 /// Value of a setting that has not been chosen yet.
 const AUTOMATIC: &str = "automatic";
@@ -107,14 +111,34 @@ impl<'a> Fields<'a> {
             }
         }
     }
+}
 
-    /// Returns a summary of the settings of network or training.
-    pub fn summary(&self, of: impl FnOnce(&RunSettings) -> String) -> String {
-        match self.set_by {
-            SetBy::User => of(self.settings),
-            SetBy::Choice(chosen) => chosen.map_or_else(|| AUTOMATIC.to_owned(), of),
+/// The folded settings that are rarely changed: geometry, inputs of the network, and training. `is_new` is false for a paused
+/// training, which keeps its network; `size` is that of the next training.
+pub fn advanced_ui(
+    ui: &mut Ui,
+    fields: &mut Fields<'_>,
+    is_new: bool,
+    has_recorded_rows: bool,
+    size: Option<TrainingSize>,
+) {
+    let summary = |settings: &RunSettings| {
+        let epochs = counted(settings.training.stopping.epochs, "epoch");
+        format!("{}, {epochs}", network::of_inputs(settings))
+    };
+    let summary = match fields.set_by {
+        SetBy::User => summary(fields.settings),
+        SetBy::Choice(chosen) => chosen.map_or_else(|| AUTOMATIC.to_owned(), summary),
+    };
+    fold_ui(ui, "Advanced", &summary, |ui| {
+        ui.add_enabled_ui(is_new, |ui| {
+            network::inputs_ui(ui, fields, has_recorded_rows, size);
+        });
+        training::training_ui(ui, fields, is_new);
+        if let Some(simulation) = fields.settings.simulation_mut() {
+            ui.add_enabled_ui(is_new, |ui| geometry_ui(ui, &mut simulation.sensor));
         }
-    }
+    });
 }
 
 impl Row {
@@ -165,7 +189,12 @@ impl Row {
         let picked = match look {
             Look::Options(_) => options_ui(ui, label, hint, &choices, selected),
             Look::List(_) => list_ui(ui, label, hint, &choices, selected),
-            _ => list_below_ui(ui, label, hint, &choices, selected),
+            _ => {
+                let (named, width) = (ui.label(label).on_hover_text(hint), ui.available_width());
+                let mut picked = None;
+                combo_ui(ui, label, width, &choices, selected, &mut picked).labelled_by(named.id);
+                picked
+            }
         };
         if let Some(picked) = picked {
             let set = setting.set(settings, &Value::Text(picked.to_owned()));
@@ -174,10 +203,16 @@ impl Row {
     }
 }
 
+/// Returns the values of a setting of the network or its training, and what the window calls them; none of a number.
+pub fn choices(setting: &str) -> Vec<Choice> {
+    let mut rows = network::INPUTS.iter().chain([&training::METHOD]);
+    rows.find(|row| row.0 == setting).map_or_else(Vec::new, Row::choices)
+}
+
 /// Returns the definition of a term.
 pub fn meaning(term: &str) -> Option<&'static str> {
     static HINTS: LazyLock<HashMap<&str, &str>> = LazyLock::new(|| {
-        let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
+        let terms = glossary::groups().into_iter().flat_map(|(_, terms)| terms);
         terms.map(|term| (term.name, term.hint)).collect()
     });
     HINTS.get(term).copied()
@@ -239,31 +274,4 @@ fn number_ui<S: Clone>(ui: &mut Ui, texts: [&str; 3], setting: &Setting<S>, of: 
         }
         Some(Field::Text(..)) | None => {}
     }
-}
-
-/// A list below its name, as wide as the form. Returns the value just selected.
-fn list_below_ui(
-    ui: &mut Ui,
-    label: &str,
-    hint: &str,
-    choices: &[(&'static str, &str, &str)],
-    selected: &str,
-) -> Option<&'static str> {
-    let named = ui.label(label).on_hover_text(hint);
-    let shown = choices.iter().find(|(name, ..)| *name == selected);
-    let combo = ComboBox::from_id_salt(label)
-        .selected_text(shown.map_or("", |(_, text, _)| *text))
-        .width(ui.available_width())
-        .height(space(90));
-    let mut picked = None;
-    let combo = combo.show_ui(ui, |ui| {
-        for &(name, text, meaning) in choices {
-            let choice = ui.selectable_label(name == selected, text).on_hover_text(meaning);
-            if choice.clicked() && name != selected {
-                picked = Some(name);
-            }
-        }
-    });
-    combo.response.labelled_by(named.id);
-    picked
 }

@@ -6,17 +6,17 @@ use decoupler_core::{
     text::counted,
 };
 use decoupler_files::export::{describe_recorded_workload, describe_workload};
-use eframe::egui::{RichText, Slider, SliderClamping, Ui, WidgetInfo};
+use eframe::egui::{RichText, Ui};
 
 use super::{Fields, Look, Row, SetBy};
 use crate::window::{
-    theme::{Theme, space, type_size},
-    widgets::{dim_ui, fields::capitalised, slider_ui},
+    theme::{Theme, type_size},
+    widgets::{dim_ui, fields::capitalised, section_heading_ui},
 };
 
 const HIDDEN: Row = Row("hidden", "Hidden nodes", Look::Number(""));
 
-const INPUTS: [Row; 2] = [
+pub(super) const INPUTS: [Row; 2] = [
     Row(
         "inputs",
         "Inputs",
@@ -46,16 +46,6 @@ pub fn hidden_ui(ui: &mut Ui, fields: &mut Fields<'_>, channels: Option<(usize, 
     if let SetBy::Choice(_) = fields.set_by {
         return;
     }
-    let hidden = &mut fields.settings.hidden;
-    let slider = Slider::new(hidden, 1..=64).clamping(SliderClamping::Never);
-    let width = ui.available_width();
-    let response = slider_ui(ui, slider, width);
-    if response.double_clicked() {
-        *hidden = fields.usual.hidden;
-    }
-    let value = *hidden as f64;
-    response.widget_info(|| WidgetInfo::slider(true, value, "Hidden nodes slider"));
-    ui.add_space(space(1));
     let Some((n, m)) = channels else { return };
     let (square_root, logarithm) = suggested_hidden(n, m);
     let (low, high) = (*square_root.start(), *square_root.end());
@@ -80,7 +70,8 @@ pub fn workload_ui(ui: &mut Ui, settings: &RunSettings, size: TrainingSize) {
 }
 
 /// Quantity and scaling of the inputs, rows of a recording that has several, and the size of the network.
-pub fn inputs_ui(ui: &mut Ui, fields: &mut Fields<'_>, has_recorded_rows: bool, size: Option<TrainingSize>) {
+pub(super) fn inputs_ui(ui: &mut Ui, fields: &mut Fields<'_>, has_recorded_rows: bool, size: Option<TrainingSize>) {
+    section_heading_ui(ui, "Network inputs");
     fields.show(ui, &INPUTS);
     if has_recorded_rows {
         ROWS.ui(ui, fields.settings, &fields.usual);
@@ -91,7 +82,7 @@ pub fn inputs_ui(ui: &mut Ui, fields: &mut Fields<'_>, has_recorded_rows: bool, 
 }
 
 /// Quantity and scaling of the inputs in a line.
-pub fn of_inputs(settings: &RunSettings) -> String {
+pub(super) fn of_inputs(settings: &RunSettings) -> String {
     let texts = INPUTS.iter().filter_map(|row| row.text(settings));
     texts.map(|text| text.to_lowercase()).collect::<Vec<_>>().join(", ")
 }

@@ -1,84 +1,79 @@
-//! Presets of a simulated array and ready-made scenes, one click each.
+//! Presets of a simulated array, one click each.
 
 use decoupler_core::{
+    dataset::Simulation,
     evaluation::{Preset, RunSettings},
-    scene::Scene,
+    sensor::SensorModel,
 };
 use eframe::egui::Ui;
 
-use crate::window::{glossary, shared::opening_scene, theme::space, widgets::explained_options_ui};
+use crate::window::{shared::opening_settings, theme::space, widgets::explained_options_ui};
 
-/// The presets: how readings are decoded and trained on.
+/// Returns the settings with those of a preset; the scale of the array is kept.
+type Change = fn(&RunSettings) -> RunSettings;
+
+/// Name, hint and settings of each preset.
+const PRESETS: [(&str, &str, Change); 3] = [
+    (
+        "Press demo",
+        "Each sample is the print of a ball of 2 to 6 mm radius, pressed somewhere onto the surface and read with 0.1 % noise: \
+         as a touch would leave it. Everything else is as in the paper. The array scale stays as it is.",
+        |settings| with_scale_of(settings, opening_settings()),
+    ),
+    (
+        "Paper",
+        "Scene, network and training of the paper: every node pressed by a random depth, no noise, one network for all rows, \
+         resistances between −1 and 1, 1000 training samples. The array scale stays as it is.",
+        |settings| with_scale_of(settings, RunSettings::default()),
+    ),
+    (
+        "Best accuracy",
+        "A small network for each known row, whitened conductances, 5000 training samples, or 50 000 if the readings are \
+         noisy: by measurement, the lowest test error for the same hidden nodes. Array, axes, loading, noise, hidden nodes \
+         and seed stay as they are.",
+        with_best,
+    ),
+];
+
+/// The presets.
 pub fn preset_ui(ui: &mut Ui, settings: &mut RunSettings) {
-    ui.add_space(space(2));
-    let options = [
-        (
-            Some(Preset::Paper),
-            "Paper",
-            "One network for all rows, resistances between −1 and 1, 1000 training samples. Array, axes, loading, noise, \
-             hidden nodes and seed stay as they are.",
-        ),
-        (
-            Some(Preset::Best),
-            "Best",
-            "A small network for each known row, whitened conductances, 5000 training samples, or 50 000 if the readings are \
-             noisy: by measurement, the lowest test error for the same hidden nodes. Array, axes, loading, noise, hidden \
-             nodes and seed stay as they are.",
-        ),
-    ];
-    if let Some(Some(picked)) = explained_options_ui(ui, "Preset", &options, preset_of(settings), true) {
-        *settings = with_preset(picked, settings);
+    let places = PRESETS.map(|(name, hint, change)| (change(settings), name, hint));
+    if let Some(picked) = explained_options_ui(ui, "Preset", &places, *settings, true) {
+        *settings = picked;
     }
+    ui.add_space(space(2));
 }
 
-/// Returns the preset that the settings follow, if any.
-fn preset_of(settings: &RunSettings) -> Option<Preset> {
-    Preset::ALL
-        .into_iter()
-        .find(|&preset| with_preset(preset, settings) == *settings)
+fn with_scale_of(settings: &RunSettings, mut preset: RunSettings) -> RunSettings {
+    if let (Some(simulation), Some(Simulation { sensor, .. })) = (settings.simulation(), preset.simulation_mut()) {
+        *sensor = SensorModel::new(simulation.sensor.scale);
+    }
+    preset
 }
 
-/// Returns the settings with those of `preset`: how readings are decoded and trained on, not the scene.
-fn with_preset(preset: Preset, settings: &RunSettings) -> RunSettings {
+fn with_best(settings: &RunSettings) -> RunSettings {
     let mut settings = *settings;
     if let Some(simulation) = settings.simulation_mut() {
         let noise = simulation.scene.noise;
-        let of_preset = preset.simulation_in(noise);
-        simulation.scene.rows = of_preset.scene.rows;
-        simulation.samples = of_preset.samples;
-        simulation.validation_samples = of_preset.validation_samples;
-        let RunSettings { inputs, training, .. } = preset.settings_in(noise);
+        let best = Preset::Best.simulation_in(noise);
+        simulation.scene.rows = best.scene.rows;
+        (simulation.samples, simulation.validation_samples) = (best.samples, best.validation_samples);
+        let RunSettings { inputs, training, .. } = Preset::Best.settings_in(noise);
         (settings.inputs, settings.training) = (inputs, training);
     }
     settings
 }
 
-/// Keeps to the preset that the settings followed `before` their noise changed: the best number of samples depends on it.
+/// Keeps to the best accuracy if the settings did so `before` their noise changed: the best number of samples depends on it.
 pub fn follow_preset(before: &RunSettings, settings: &mut RunSettings) {
     let noise = |settings: &RunSettings| settings.simulation().map(|simulation| simulation.scene.noise);
-    if noise(before) != noise(settings)
-        && let Some(preset) = preset_of(before)
-    {
-        *settings = with_preset(preset, settings);
+    if noise(before) != noise(settings) && with_best(before) == *before {
+        *settings = with_best(settings);
     }
 }
 
-/// The ready-made scenes. All other settings of a scene are folded below them.
-pub fn scene_choice_ui(ui: &mut Ui, scene: &mut Scene) {
-    ui.add_space(space(1));
-    // The preset decides which rows share a network.
-    let [print, paper] = [opening_scene(), Scene::default()].map(|ready| Scene {
-        rows: scene.rows,
-        ..ready
-    });
-    let options = [
-        (
-            print,
-            "Indenter's print",
-            "Each sample is the print of a ball of 2 to 6 mm radius, pressed somewhere onto the surface: as a touch \
-             would leave it.",
-        ),
-        (paper, "Paper's scene", glossary::RANDOM_NODES.hint),
-    ];
-    *scene = explained_options_ui(ui, "Ready-made scenes", &options, *scene, true).unwrap_or(*scene);
+/// Returns the name of the preset that leads from one of the settings to the other, if one does.
+pub fn preset_between(before: &RunSettings, after: &RunSettings) -> Option<&'static str> {
+    let preset = PRESETS.iter().find(|(.., change)| change(before) == *after);
+    preset.map(|(name, ..)| *name)
 }

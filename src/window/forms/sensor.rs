@@ -13,8 +13,8 @@ use crate::window::{
     glossary,
     widgets::{
         dim_ui,
-        fields::{input_text, quantity_ui, usually},
-        note_ui, segmented_ui, text_ui,
+        fields::{quantity_ui, usually},
+        note_ui, section_heading_ui, segmented_ui, text_ui,
     },
 };
 
@@ -65,8 +65,9 @@ pub fn array_ui(ui: &mut Ui, Simulation { sensor, scene, .. }: &mut Simulation) 
     }
 }
 
-/// Lengths and resistivity, and the way back to the assumed ones.
+/// Lengths and resistivity.
 pub fn geometry_ui(ui: &mut Ui, sensor: &mut SensorModel) {
+    section_heading_ui(ui, "Geometry");
     for (name, length) in LENGTHS {
         let hint = meaning(name).unwrap_or(PLACES);
         let usual = *length(&mut Geometry::default());
@@ -95,14 +96,4 @@ pub fn geometry_ui(ui: &mut Ui, sensor: &mut SensorModel) {
         "Ω/mm",
     );
     dim_ui(ui, Geometry::ASSUMPTION);
-    if sensor.geometry != Geometry::default() && ui.button("Reset to the assumed geometry").clicked() {
-        sensor.geometry = Geometry::default();
-    }
-}
-
-/// Height, and whether the geometry differs from the assumed one.
-pub fn of_geometry(geometry: &Geometry) -> String {
-    let is_assumed = *geometry == Geometry::default();
-    let kind = if is_assumed { "assumed" } else { "custom" };
-    format!("{kind}, {} mm high", input_text(geometry.height_mm))
 }

@@ -1,12 +1,12 @@
 //! The training: its method, the rules that end it, and its restarts.
 
-use decoupler_core::{settings::Method, text::counted};
+use decoupler_core::settings::Method;
 use eframe::egui::Ui;
 
 use super::{Fields, Look, Row, SetBy, number_ui};
-use crate::window::widgets::{dim_ui, fields::capitalised, fold_ui};
+use crate::window::widgets::{dim_ui, fields::capitalised, section_heading_ui};
 
-const METHOD: Row = Row(
+pub(super) const METHOD: Row = Row(
     "method",
     "Method",
     Look::Below(|| Vec::from(Method::all().map(|method| (method.short_name(), method.name())))),
@@ -37,24 +37,18 @@ pub fn method_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
     }
 }
 
-/// The folded settings of the training. A paused one (`is_new` is false) keeps its restarts.
-pub fn training_ui(ui: &mut Ui, fields: &mut Fields<'_>, is_new: bool) {
-    let stopping = fields.summary(|settings| counted(settings.training.stopping.epochs, "epoch"));
-    fold_ui(ui, "When to stop", &stopping, |ui| {
-        fields.show(ui, &[EPOCHS]);
-        if let SetBy::User = fields.set_by {
-            fields.show(ui, &STOPPING);
+/// The rules that end the training, the settings of its method, and its restarts. A paused training (`is_new` is false) keeps
+/// the latter.
+pub(super) fn training_ui(ui: &mut Ui, fields: &mut Fields<'_>, is_new: bool) {
+    section_heading_ui(ui, "Training");
+    fields.show(ui, &[EPOCHS]);
+    if let SetBy::User = fields.set_by {
+        fields.show(ui, &STOPPING);
+        let method = &mut fields.settings.training.method;
+        for setting in method.settings() {
+            let texts = [&capitalised(setting.name), setting.help, ""];
+            number_ui(ui, texts, setting, method, &fields.usual.training.method);
         }
-    });
-    let restarts = fields.summary(|settings| counted(settings.starts, "restart"));
-    fold_ui(ui, "Method settings", &restarts, |ui| {
-        if let SetBy::User = fields.set_by {
-            let method = &mut fields.settings.training.method;
-            for setting in method.settings() {
-                let texts = [&capitalised(setting.name), setting.help, ""];
-                number_ui(ui, texts, setting, method, &fields.usual.training.method);
-            }
-        }
-        ui.add_enabled_ui(is_new, |ui| fields.show(ui, &RESTARTS));
-    });
+    }
+    ui.add_enabled_ui(is_new, |ui| fields.show(ui, &RESTARTS));
 }

@@ -3,15 +3,18 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
+use eframe::egui::ColorImage;
+
 use super::{DecouplerWindow, files::ToWrite, modal::Modal, remembered::is_within_limits, save_form::Saving};
 use crate::window::{
-    job::caught,
+    job::{JobError, caught},
     preview,
     shared::{
-        Effect, FileInUse, FileTask, Look, Matter, Phase, Purpose, RecordingDraft, RunsRequest, SourceKind, ViewKind,
+        Effect, FileInUse, FileTask, Look, Matter, Notice, OpenPlan, Phase, Purpose, RecordingDraft, RunsRequest,
+        SourceKind, ToCopy, ViewKind,
     },
     theme,
-    training_worker::{LOST, Origin, Request, TrainedRun},
+    training_worker::{LOST, Origin, Request, RunView, TrainedRun},
     views::CHECKPOINT,
 };
 use decoupler_core::evaluation::RunSettings;
@@ -36,11 +39,12 @@ impl DecouplerWindow {
                 self.notices.settle(Matter::Settings);
             }
             Effect::ChooseAutomatically(is_auto) => self.choose_automatically(is_auto),
-            Effect::Import(plan) => shared.recording.plan = plan,
+            Effect::Import(plan) => shared.recording.plan = plan.map(OpenPlan),
             Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
             Effect::ChooseSource(_) => {}
             Effect::TakeSetup(setup) => self.take_setup(&setup),
-            Effect::ShowTraining => self.show(ViewKind::Train),
+            Effect::Show(view) => self.show(view),
+            Effect::OpenRun(id) => self.open_run(id, true),
             Effect::Train => match shared.setup() {
                 Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
                     self.begin(Origin::Chosen(Box::new(setup)));
@@ -63,7 +67,7 @@ impl DecouplerWindow {
                 // The settings on the left are always those of the running training.
                 if let Some(run) = &mut shared.run {
                     run.is_saved = false;
-                    let training = run.asked.settings().training;
+                    let training = run.asked.settings.training;
                     shared.set_training(training);
                 }
                 shared.phase = Phase::Training;
@@ -76,6 +80,7 @@ impl DecouplerWindow {
                 self.worker.ask(Request::Continue(shared.settings().training));
             }
             Effect::Continue => {}
+            Effect::UseRidge => self.worker.ask(Request::UseRidge),
             Effect::Stop => {
                 self.worker.ask(Request::Stop);
                 // The training being prepared does not begin; the previous one stays.
@@ -90,11 +95,19 @@ impl DecouplerWindow {
                 }
             }
             Effect::Export(exporting) => self.modal = Some(Modal::Export(*exporting)),
-            Effect::Copy(to_copy, notice) => self.copy(to_copy, notice),
-            Effect::KeepRun(file) => self.runs.ask(RunsRequest::Keep(file)),
-            Effect::RenameRun(id, name) => self.runs.ask(RunsRequest::Rename(id, name)),
-            Effect::PinRun(place, id) => self.runs.ask(RunsRequest::Pin(place, id)),
-            Effect::RemoveRun(id) => self.runs.ask(RunsRequest::Remove(id)),
+            Effect::Copy(ToCopy::Text(text), notice) => {
+                self.ctx.copy_text(text);
+                self.notices.add(Matter::Clipboard, Notice::Done(notice));
+            }
+            Effect::Copy(ToCopy::Picture(figure), notice) => {
+                let draw = move |_: &_| match figure.draw().pixels() {
+                    Ok((size, rgba)) => Ok((ColorImage::from_rgba_unmultiplied(size, &rgba), notice)),
+                    Err(error) => Err(error.to_string()),
+                };
+                let last = |drawn: Result<_, JobError>| drawn.map_err(|error| error.to_string()).flatten();
+                self.pictures.start(draw, last);
+            }
+            Effect::ChangeRuns(request) => self.runs.ask(request),
             Effect::Notify(matter, notice) => self.notices.add(matter, notice),
             Effect::Settle(matter) => self.notices.settle(matter),
         }
@@ -115,6 +128,55 @@ impl DecouplerWindow {
         self.worker.begin(origin);
     }
 
+    /// Opens a run of the list, chosen by the user or the last one after the start.
+    pub(super) fn open_run(&mut self, id: u64, is_chosen: bool) {
+        let runs = &self.shared.runs;
+        let Some(run) = runs.run(id).cloned() else { return };
+        let folder = runs.path.clone().unwrap_or_default();
+        let open = move |_: &_| {
+            let file = run.load(&folder).map_err(|error| error.to_string());
+            let opened = file.and_then(|file| RunView::kept(run.name.clone(), file));
+            let opened = opened.map_err(|error| format!("The run '{}' cannot be opened: {error}", run.name));
+            (is_chosen, opened.map(Box::new))
+        };
+        self.opening.start(open, |opened| {
+            opened.unwrap_or_else(|error| (true, Err(error.to_string())))
+        });
+    }
+
+    /// Shows a run of the list: with its settings if the user chose it, otherwise if it is of those on the left.
+    pub(super) fn take_opened(&mut self, is_chosen: bool, mut run: RunView) {
+        let shared = &mut self.shared;
+        if shared.phase.is_busy() {
+            return;
+        }
+        if !is_chosen {
+            let Ok(asked) = shared.asked() else { return };
+            let has_same = match (&asked.plan, run.setup.plan()) {
+                (Some(plan), Some(of_run)) => plan.files() == of_run.files(),
+                _ => have_same_test_set(&asked.settings, run.settings()),
+            };
+            if !has_same || shared.run.is_some() {
+                return;
+            }
+            if run.search.is_some() && shared.recording.is_automatic() {
+                run.asked = asked;
+            }
+        }
+        let setup = run.setup.clone();
+        shared.run = Some(run);
+        shared.phase = shared.phase_at_rest();
+        if is_chosen {
+            self.opened = None;
+            self.take_setup(&setup);
+            self.show(ViewKind::Train);
+        }
+        self.share_plan();
+        if self.shared.source == SourceKind::Array {
+            self.request_preview();
+        }
+    }
+
     /// Starts the worker again after it died.
     pub(super) fn restart_worker(&mut self) {
         self.worker.restart(Arc::clone(&self.wake));
@@ -128,11 +190,10 @@ impl DecouplerWindow {
         if let (false, Some(setup)) = (is_auto, chosen) {
             self.take_setup(&setup);
             // Given by hand, these settings would have had the same result.
-            if let Some(run) = &mut self.shared.run {
-                run.plan = setup.plan().map(|plan| Arc::new(plan.clone()));
-                run.asked = setup;
+            let asked = self.shared.asked();
+            if let (Some(run), Ok(asked)) = (&mut self.shared.run, asked) {
+                run.asked = asked;
             }
-            self.share_plan();
         }
     }
 
@@ -143,17 +204,16 @@ impl DecouplerWindow {
         self.runs.ask(RunsRequest::Look);
     }
 
-    /// Sets the look of all surfaces, and remembers the colours that the user chose.
+    /// Sets the look of all surfaces, and remembers the theme and the colours that the user chose.
     pub(super) fn look(&mut self, look: Look) {
-        if look.colours != self.shared.look.colours {
+        let before = std::mem::replace(&mut self.shared.look, look);
+        if look.colours != before.colours {
             self.chosen.colours = Some(look.colours);
         }
-        self.shared.look = look;
-    }
-
-    pub(super) fn set_dark(&mut self, is_dark: bool) {
-        self.shared.look.is_dark = is_dark;
-        theme::apply(&self.ctx, is_dark);
+        if look.is_dark != before.is_dark {
+            self.chosen.is_dark = Some(look.is_dark);
+            theme::apply(&self.ctx, look.is_dark);
+        }
     }
 
     /// Asks for a path in the window itself.
@@ -188,7 +248,7 @@ impl DecouplerWindow {
     /// asked, but does not know which files are in use.
     pub(super) fn answer(&mut self, task: FileTask, path: PathBuf, asks: bool) {
         match &task.purpose {
-            Purpose::Save(contents) => {
+            Purpose::Save(contents) | Purpose::Decode(contents) => {
                 let (send, taken) = channel();
                 let (run, contents) = (contents.run, contents.clone());
                 let take = move |trained: Result<Option<&TrainedRun>, &str>| {
@@ -208,7 +268,11 @@ impl DecouplerWindow {
                     }
                     None => take(Ok(None)),
                 }
-                let used = self.files_in_use(&task);
+                let used = if task.is_read() {
+                    Vec::new()
+                } else {
+                    self.files_in_use(&task)
+                };
                 self.files.write(ToWrite { task, path, asks }, used, move |path| {
                     let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
                     taken?(path)
@@ -260,7 +324,7 @@ impl DecouplerWindow {
                 self.shared.recording = RecordingDraft {
                     settings: *setup.settings(),
                     is_auto: false,
-                    plan: Ok(Arc::new(plan)),
+                    plan: Ok(OpenPlan(Arc::new(plan))),
                 };
             }
         }

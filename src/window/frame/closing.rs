@@ -6,7 +6,7 @@ use super::{
     modal::{Modal, Reply, card_ui},
 };
 use crate::window::{
-    shared::{Phase, Shared, SourceKind, Unfinished, ViewKind},
+    shared::{Phase, Shared, Unfinished, ViewKind},
     theme::{semibold, space, type_size},
     widgets::{dim_ui, ghost_button, primary_button},
 };
@@ -86,11 +86,10 @@ impl DecouplerWindow {
 
 /// Returns the training if it is being prepared or has unsaved epochs.
 fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
-    let progress = match (shared.phase, shared.source) {
-        (Phase::Idle | Phase::Ended(_), _) => return None,
-        (Phase::Preparing, SourceKind::Array) => "its samples are being drawn".to_owned(),
-        (Phase::Preparing, SourceKind::Recording) => "its files are being read".to_owned(),
-        (Phase::Training | Phase::Paused | Phase::Calibrating, _) => {
+    let progress = match shared.phase {
+        Phase::Idle | Phase::Ended(_) => return None,
+        Phase::Preparing => "its samples are being drawn or read".to_owned(),
+        Phase::Training | Phase::Paused | Phase::Calibrating => {
             let run = shared.run.as_ref().filter(|run| !run.is_saved)?;
             let epoch = run.latest().map_or(0, |latest| latest.epoch);
             format!("epoch {epoch} of {}", run.settings().training.stopping.epochs)

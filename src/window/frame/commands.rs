@@ -1,6 +1,6 @@
 use std::ops::RangeInclusive;
 
-use decoupler_core::evaluation::RunSettings;
+use decoupler_core::evaluation::{RUN_OPTIONS, RunSettings};
 use decoupler_files::figure::SequentialMap;
 use eframe::egui::{Context, Key, Modifiers, util::undoer::Undoer};
 
@@ -10,7 +10,8 @@ use super::{
     modal::{Modal, Palette},
 };
 use crate::window::{
-    shared::{Command, Effect, Look, Offer, Offers, RecordingDraft, Shared, SourceKind, ViewKind},
+    forms::preset_between,
+    shared::{Command, Effect, Look, Matter, Notice, Offer, Offers, RecordingDraft, Shared, SourceKind, ViewKind},
     test_view::HeightScale,
 };
 
@@ -29,14 +30,26 @@ impl DecouplerWindow {
         }
         let is_listed = self.picked.is_some() || matches!(self.modal, Some(Modal::Palette(_)));
         let mut offers = Offers::new(ctx, self.picked.take(), self.modal.is_none());
-        let view = self.views.get(self.shared.shown);
-        view.take_commands(&mut offers, &self.shared, effects);
-        // These have no keys, and take longer to list.
-        if is_listed {
-            for shown in view.shown(&self.shared) {
+        let mut take = |kind: ViewKind, offers: &mut Offers<'_>, effects: &mut Vec<Effect>| {
+            let view = self.views.get(kind);
+            view.take_commands(offers, &self.shared, effects);
+            // These have no keys, and take longer to list.
+            for shown in is_listed.then(|| view.shown(&self.shared)).into_iter().flatten() {
                 if offers.offer(Command::Export(shown.action()), shown.item.is_ok()) {
                     effects.push(shown.ask());
                 }
+            }
+        };
+        let kind = self.shared.shown;
+        take(kind, &mut offers, effects);
+        let mut of_others = Vec::new();
+        for other in ViewKind::ALL {
+            if other != kind && is_listed {
+                // Nothing is picked, and no key is heard.
+                let mut listed = Offers::new(ctx, None, false);
+                take(other, &mut listed, &mut Vec::new());
+                let of = Some(other);
+                of_others.extend(listed.into_list().into_iter().map(|offer| Offer { of, ..offer }));
             }
         }
         for (command, is_possible) in self.commands() {
@@ -44,7 +57,9 @@ impl DecouplerWindow {
                 self.carry_out(&command);
             }
         }
-        offers.into_list()
+        let mut list = offers.into_list();
+        list.extend(of_others);
+        list
     }
 
     /// Returns the commands of the window, and whether each is possible now.
@@ -55,8 +70,8 @@ impl DecouplerWindow {
         let drafts = drafts(shared);
         let scale = self.ctx.zoom_factor();
         let heights = match look.heights {
-            HeightScale::Stroke => Command::FreeHeights,
-            HeightScale::Fitted => Command::LockHeights,
+            HeightScale::Stroke => ("Free the scale of heights", HeightScale::Fitted),
+            HeightScale::Fitted => ("Lock the scale of heights", HeightScale::Stroke),
         };
         let mut commands = vec![
             (Command::Undo, is_free && self.undoer.has_undo(&drafts)),
@@ -66,8 +81,11 @@ impl DecouplerWindow {
         commands.push((if look.is_dark { Command::Light } else { Command::Dark }, true));
         commands.extend(SequentialMap::ALL.map(|map| (Command::Colours(map), map != look.colours)));
         commands.extend([
-            (heights, true),
-            (Command::FreeErrors, look.error_limit_mm.is_some()),
+            (Command::Scale(heights.0, heights.1, look.error_limit_mm), true),
+            (
+                Command::Scale("Free the scale of errors", look.heights, None),
+                look.error_limit_mm.is_some(),
+            ),
             (Command::Larger, scale < *SCALES.end() - 0.5 * STEP),
             (Command::Smaller, scale > *SCALES.start() + 0.5 * STEP),
             (Command::UsualSize, (scale - 1.0).abs() > 0.5 * STEP),
@@ -85,32 +103,21 @@ impl DecouplerWindow {
         match command {
             Command::Undo => {
                 let earlier = self.undoer.undo(&drafts(&self.shared)).cloned();
-                self.take_drafts(earlier);
+                self.take_drafts("Undone", earlier);
             }
             Command::Redo => {
                 let later = self.undoer.redo(&drafts(&self.shared)).cloned();
-                self.take_drafts(later);
+                self.take_drafts("Redone", later);
             }
             Command::Show(view) => self.show(*view),
             Command::Dark | Command::Light => {
                 let is_dark = *command == Command::Dark;
-                self.chosen.is_dark = Some(is_dark);
-                self.set_dark(is_dark);
+                self.look(Look { is_dark, ..look });
             }
-            Command::Colours(colours) => self.look(Look {
-                colours: *colours,
-                ..look
-            }),
-            Command::LockHeights => self.look(Look {
-                heights: HeightScale::Stroke,
-                ..look
-            }),
-            Command::FreeHeights => self.look(Look {
-                heights: HeightScale::Fitted,
-                ..look
-            }),
-            Command::FreeErrors => self.look(Look {
-                error_limit_mm: None,
+            &Command::Colours(colours) => self.look(Look { colours, ..look }),
+            &Command::Scale(_, heights, error_limit_mm) => self.look(Look {
+                heights,
+                error_limit_mm,
                 ..look
             }),
             Command::Larger => self.set_scale(self.ctx.zoom_factor() + STEP),
@@ -133,13 +140,22 @@ impl DecouplerWindow {
         self.chosen.scale = Some(scale);
     }
 
-    /// Takes settings that were undone or redone.
-    fn take_drafts(&mut self, drafts: Option<Drafts>) {
-        let Some((source, draft, mut recording)) = drafts else {
-            return;
+    /// Takes settings that were undone or redone, says what has changed, and shows it.
+    fn take_drafts(&mut self, done: &str, taken: Option<Drafts>) {
+        let Some(taken) = taken else { return };
+        let present = drafts(&self.shared);
+        let [before, after] = if done == "Undone" {
+            [&taken, &present]
+        } else {
+            [&present, &taken]
         };
+        let text = format!("{done}: {}", difference(before, after));
+        if !matches!(self.shared.shown, ViewKind::Train | ViewKind::Sensor) {
+            self.show(ViewKind::Train);
+        }
+        let (source, draft, mut recording) = taken;
         match &recording.plan {
-            Ok(plan) if !self.shared.recording.is_plan(Some(plan)) => self.views.open_plan(plan),
+            Ok(plan) if self.shared.recording.plan.as_ref() != Ok(plan) => self.views.open_plan(plan),
             Ok(_) => {}
             // Undoing closes no files.
             Err(_) => recording.plan.clone_from(&self.shared.recording.plan),
@@ -147,6 +163,7 @@ impl DecouplerWindow {
         self.shared.recording = recording;
         self.shared.draft = draft;
         self.choose_source(source);
+        self.notices.add(Matter::Settings, Notice::Done(text));
     }
 }
 
@@ -159,4 +176,25 @@ pub(super) type DraftsUndoer = Undoer<Drafts>;
 /// Returns the current settings; their plan is shared, not copied.
 pub(super) fn drafts(shared: &Shared) -> Drafts {
     (shared.source, shared.draft, shared.recording.clone())
+}
+
+/// Returns what was changed: "hidden, epochs", "preset Best accuracy".
+fn difference(before: &Drafts, after: &Drafts) -> String {
+    let settings = |(source, draft, recording): &Drafts| match source {
+        SourceKind::Array => *draft,
+        SourceKind::Recording => recording.settings,
+    };
+    let [a, b] = [before, after].map(settings);
+    let mut names: Vec<_> = RUN_OPTIONS.iter().map(|option| &option.setting).collect();
+    names.retain(|setting| setting.get(&a) != setting.get(&b));
+    match &names[..] {
+        _ if before.0 != after.0 => "source of the samples".to_owned(),
+        [] if before.2.plan != after.2.plan => "import".to_owned(),
+        [] if before.2.is_auto != after.2.is_auto => "automatic settings".to_owned(),
+        [] if a.source != b.source => "sensor or scene".to_owned(),
+        [] => "settings of the method".to_owned(),
+        [_, _, ..] if let Some(preset) = preset_between(&a, &b) => format!("preset {preset}"),
+        [first, second, third, _, ..] => format!("{}, {}, {} and others", first.name, second.name, third.name),
+        few => Vec::from_iter(few.iter().map(|setting| setting.name)).join(", "),
+    }
 }

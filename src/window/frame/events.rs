@@ -10,20 +10,40 @@ use crate::window::{
     shared::{Matter, Notice, Phase, Preview, RunView, RunsRequest, ViewKind},
     training_worker::{Event, Start},
 };
-use decoupler_core::evaluation::RunSettings;
 
 impl DecouplerWindow {
     /// Handles the events of threads and dialogs.
     pub fn take_events(&mut self) {
-        self.take_copied();
+        match self.pictures.next_event() {
+            Some(Ok((picture, notice))) => {
+                self.ctx.copy_image(picture);
+                self.notices.add(Matter::Clipboard, Notice::Done(notice));
+            }
+            Some(Err(reason)) => {
+                let text = format!("Nothing was copied: {reason}");
+                self.notices.fail(Matter::Clipboard, text);
+            }
+            None => {}
+        }
         while let Some(event) = self.worker.next_event() {
             self.take_event(event);
         }
         while let Some(event) = self.previews.next_event() {
             self.take_preview(event);
         }
+        let was_listed = self.shared.runs.path.is_some();
         if let Some(notice) = self.shared.runs.take_events(&self.runs) {
             self.notices.add(Matter::RunList, notice);
+        }
+        let last = self.shared.runs.newest().map(|run| run.id);
+        if let (false, true, Some(last)) = (was_listed, self.shared.runs.path.is_some(), last) {
+            self.open_run(last, false);
+        }
+        match self.opening.next_event() {
+            Some((is_chosen, Ok(run))) => self.take_opened(is_chosen, *run),
+            Some((true, Err(reason))) => self.notices.fail(Matter::RunList, reason),
+            // The files of the last run may be gone, which the recording says.
+            Some((false, Err(_))) | None => {}
         }
         while let Some(written) = self.files.next_written() {
             self.report_written(written);
@@ -111,19 +131,17 @@ impl DecouplerWindow {
 
     /// Shares the plan on the left with the training, if they have the same.
     pub(super) fn share_plan(&mut self) {
-        if let Some(run) = &mut self.shared.run {
-            run.share_plan(&self.shared.recording);
+        let asked = self.shared.asked();
+        if let (Some(run), Ok(asked)) = (&mut self.shared.run, asked)
+            && run.asked == asked
+        {
+            run.asked = asked;
         }
     }
 
     fn take_event(&mut self, event: Event) {
         let shared = &mut self.shared;
-        if !matches!(event, Event::Reading(_)) {
-            shared.reading = None;
-        }
-        if !matches!(event, Event::Choosing(_)) {
-            shared.choosing = None;
-        }
+        shared.preparing = None;
         match event {
             Event::Began(_, start, Ok(began)) => self.take_begun(*began, start),
             Event::Began(_, start, Err(reason)) => {
@@ -152,10 +170,7 @@ impl DecouplerWindow {
                 let asked = shared.chosen_run().is_none().then(|| shared.settings().training);
                 if let Some(run) = &mut shared.run {
                     if let Some(training) = asked {
-                        run.asked = run.asked.with_settings(RunSettings {
-                            training,
-                            ..*run.asked.settings()
-                        });
+                        run.asked.settings.training = training;
                     }
                     run.setup = run.setup.with_settings(*settings);
                     run.is_saved = false;
@@ -170,8 +185,7 @@ impl DecouplerWindow {
                 };
                 self.notices.fail(Matter::Training, error);
             }
-            Event::Reading(progress) => shared.reading = Some(progress),
-            Event::Choosing(progress) => shared.choosing = Some(*progress),
+            Event::Preparing(progress) => shared.preparing = Some(progress),
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
                     shared.phase = Phase::Ended(reason);

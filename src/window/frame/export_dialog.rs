@@ -2,13 +2,13 @@
 //! user chooses the form of an export.
 
 use decoupler_files::export::TableForm;
-use eframe::egui::{Align, ComboBox, Label, Layout, Response, RichText, Ui, containers::menu::MenuButton};
+use eframe::egui::{Align, Layout, Response, RichText, Ui, containers::menu::MenuButton};
 
-use super::modal::{Reply, card_ui};
+use super::modal::{Reply, card_ui, take_focus};
 use crate::window::{
     shared::{Effect, ExportLine, Exporting, Format, Item, Shown},
     theme::{semibold, space, type_size},
-    widgets::{dim_ui, ghost_button, primary_button},
+    widgets::{dim_ui, fields::list_ui, ghost_button, primary_button},
 };
 
 /// The button that opens the menu. `shown` lists what the view shows; it is called only while the menu is open.
@@ -94,9 +94,7 @@ pub(super) fn export_dialog_ui(ui: &Ui, exporting: &mut Exporting, shown: Vec<Sh
             let button = primary_button(if is_copy { "Copy" } else { "Save…" });
             let button = ui.add_enabled(chosen.is_some(), button);
             // Enter is enough; Tab still reaches the lists.
-            if ui.memory(|memory| memory.focused().is_none()) {
-                button.request_focus();
-            }
+            take_focus(ui, &button);
             let is_left = ui.add(ghost_button("Cancel")).clicked();
             let chosen = chosen.filter(|_| button.clicked());
             let effect = chosen.and_then(|(shown, format)| export(shown, format, exporting));
@@ -173,18 +171,8 @@ fn chosen_ui<'s, 'a>(
 }
 
 /// A list of options behind its name.
-fn choice_ui<T: PartialEq>(ui: &mut Ui, name: &str, options: impl Iterator<Item = (T, String)>, chosen: &mut T) {
-    let options: Vec<_> = options.collect();
-    ui.horizontal(|ui| {
-        let label = ui.add_sized([space(20), space(7)], Label::new(name).halign(Align::Min));
-        let text = options.iter().find(|(option, _)| option == chosen);
-        let text = text.map_or("", |(_, text)| text);
-        let combo = ComboBox::from_id_salt(name).selected_text(text).width(space(80));
-        let list = combo.show_ui(ui, |ui| {
-            for (option, text) in options {
-                ui.selectable_value(chosen, option, text);
-            }
-        });
-        list.response.labelled_by(label.id);
-    });
+fn choice_ui<T: Copy + PartialEq>(ui: &mut Ui, name: &str, options: impl Iterator<Item = (T, String)>, chosen: &mut T) {
+    let options = Vec::from_iter(options);
+    let options = Vec::from_iter(options.iter().map(|(option, text)| (*option, &**text, "")));
+    *chosen = list_ui(ui, name, "", &options, *chosen).unwrap_or(*chosen);
 }

@@ -19,7 +19,7 @@ use thiserror::Error;
 
 use super::{
     DecouplerWindow, Desktop,
-    remembered::{MIN_SIZE_POINTS, Remembered, WindowFile},
+    remembered::{MIN_SIZE_POINTS, WindowFile},
 };
 use crate::window::{
     job::{Background, JobError, Wake, start_thread},
@@ -104,7 +104,7 @@ impl Files {
     ) {
         let (path, asks) = (to_write.path.clone(), to_write.asks);
         // A folder is never replaced as a whole; a file that is being written counts as existing.
-        let asks = asks && !to_write.task.words.extensions.is_empty();
+        let asks = asks && !to_write.task.is_read() && !to_write.task.words.extensions.is_empty();
         let is_under_way = self.paths().any(|other| other == path);
         let work = move || match refuse_in_use(&path, &used) {
             Err(reason) => Written::InUse(reason),
@@ -275,15 +275,12 @@ pub fn open(files: Vec<PathBuf>) -> Result<(), OpenError> {
     let file = folders
         .as_ref()
         .map(|folders| WindowFile::read(folders.data_dir().join("window.json")));
-    let size_points = match &file {
-        Some(file) => file.remembered.opening_size_points(),
-        None => Remembered::default().opening_size_points(),
-    };
+    let remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
     let icon = eframe::icon_data::from_png_bytes(include_bytes!("../../../assets/icon.png"));
     let mut viewport = egui::ViewportBuilder::default()
         .with_title("Decoupler")
         .with_app_id("decoupler")
-        .with_inner_size(size_points)
+        .with_inner_size(remembered.opening_size_points())
         .with_min_inner_size(MIN_SIZE_POINTS);
     if let Ok(icon) = icon {
         viewport = viewport.with_icon(icon);
@@ -310,16 +307,9 @@ pub fn open(files: Vec<PathBuf>) -> Result<(), OpenError> {
     let run = || eframe::run_native("Decoupler", options, Box::new(create));
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)) {
         Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(OpenError::NoWindow(without_source_line(&error.to_string()))),
+        Ok(Err(error)) => Err(OpenError::NoWindow(error.to_string())),
         Err(_) => Err(OpenError::Failed),
     }
-}
-
-/// Returns a message of the window system without the source line that it names: "os error at FILE:LINE: cause".
-fn without_source_line(message: &str) -> String {
-    let parts = message.split_once("os error at ");
-    let cause = parts.and_then(|(before, after)| Some((before, after.split_once(": ")?.1)));
-    cause.map_or(message.to_owned(), |(before, cause)| format!("{before}{cause}"))
 }
 
 /// Why no file is opened now.
@@ -358,13 +348,11 @@ impl DecouplerWindow {
             .ctx()
             .layer_painter(LayerId::new(Order::Foreground, Id::unique("dropping")));
         let whole = ui.ctx().content_rect().shrink(space(2));
-        painter.rect_filled(whole, f32::from(radius()), palette.background.gamma_multiply(0.85));
-        painter.rect_stroke(
-            whole,
-            f32::from(radius()),
+        let (fill, stroke) = (
+            palette.background.gamma_multiply(0.85),
             Stroke::new(2.0, palette.accent),
-            StrokeKind::Inside,
         );
+        painter.rect(whole, radius(), fill, stroke, StrokeKind::Inside);
         let font = FontId::proportional(type_size().title);
         let text = if self.shared.phase.is_busy() {
             BUSY
@@ -389,20 +377,6 @@ mod tests {
         description: "",
         extensions: &["csv"],
     };
-
-    #[test]
-    fn messages_of_the_window_system_name_no_source_file() {
-        for (message, expected) in [
-            (
-                "winit: os error at /build/winit/mod.rs:788: no server: 3",
-                "winit: no server: 3",
-            ),
-            (r"os error at C:\build\mod.rs:1: no server", "no server"),
-            ("no OpenGL: none found", "no OpenGL: none found"),
-        ] {
-            assert_eq!(without_source_line(message), expected);
-        }
-    }
 
     #[test]
     fn every_file_is_reported_even_if_writing_it_panicked() {

@@ -1,6 +1,6 @@
 use eframe::egui::{FontId, Label, RichText, ScrollArea, TextEdit, TextStyle, Ui, WidgetInfo, accesskit::Role, vec2};
 
-use super::modal::{Reply, card_ui};
+use super::modal::{Reply, card_ui, take_focus};
 use crate::window::{
     glossary::{self, Term},
     shared::Offer,
@@ -99,23 +99,20 @@ fn glossary_ui(ui: &mut Ui, typed: &mut String) {
         .desired_width(f32::INFINITY);
     let field = ui.add(field);
     field.widget_info(|| WidgetInfo::labeled(Role::SearchInput, true, "Term"));
-    field.request_focus();
+    take_focus(ui, &field);
     ui.add_space(space(1));
     let scroll = ScrollArea::vertical()
         .max_height(space(112))
         .min_scrolled_height(space(112));
     scroll.auto_shrink([false, true]).show(ui, |ui| {
         let mut is_any = false;
-        for group in glossary::groups() {
-            let found: Vec<&Term> = group.terms.iter().filter(|term| term.matches(typed)).collect();
-            if found.is_empty() {
-                continue;
+        for (heading, mut terms) in glossary::groups() {
+            terms.retain(|term| term.matches(typed));
+            if !terms.is_empty() {
+                is_any = true;
+                section_heading_ui(ui, heading);
             }
-            is_any = true;
-            section_heading_ui(ui, group.heading);
-            for term in found {
-                term_ui(ui, term);
-            }
+            terms.iter().for_each(|term| term_ui(ui, term));
         }
         if !is_any {
             dim_ui(ui, "No matches");

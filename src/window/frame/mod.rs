@@ -2,7 +2,6 @@
 //! by views in one place.
 
 mod applying;
-mod clipboard;
 mod closing;
 mod commands;
 mod events;

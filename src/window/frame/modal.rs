@@ -17,9 +17,9 @@ use super::{
 };
 use crate::window::{
     glossary,
-    shared::{About, Command, Effect, Exporting, Offer},
+    shared::{About, Command, Effect, Exporting, Offer, ViewKind},
     theme::{Theme, space},
-    widgets::dim_ui,
+    widgets::{dim_ui, hinted},
 };
 
 /// The open modal.
@@ -42,7 +42,7 @@ pub(super) enum Reply {
     /// Close it.
     Close,
     /// Do this.
-    Do(Command),
+    Do(Command, Option<ViewKind>),
     /// Explain this term.
     Define(&'static str),
     /// Use this path, after asking about a file that exists there if true.
@@ -79,7 +79,10 @@ impl DecouplerWindow {
                 self.modal = None;
                 self.apply(*effect);
             }
-            Some(Reply::Do(command)) => (self.modal, self.picked) = (None, Some(command)),
+            Some(Reply::Do(command, of)) => {
+                (self.modal, self.picked) = (None, Some(command));
+                of.into_iter().for_each(|view| self.show(view));
+            }
             Some(Reply::Define(term)) => self.modal = Some(Modal::Help(Help::open(Page::Glossary, term))),
             Some(Reply::Leave { keeps_training }) => self.leave(keeps_training),
         }
@@ -96,6 +99,13 @@ pub(super) fn card_ui(ui: &Ui, id: &str, width: f32, add: impl FnOnce(&mut Ui) -
     });
     let closed = modal.should_close().then_some(Reply::Close);
     closed.or(modal.inner)
+}
+
+/// Gives the focus to a field of a card, unless the user has moved it.
+pub(super) fn take_focus(ui: &Ui, field: &Response) {
+    if ui.memory(|memory| memory.focused().is_none()) {
+        field.request_focus();
+    }
 }
 
 /// The open list of all commands: typing filters it, and Enter does the selected one.
@@ -129,11 +139,7 @@ impl Line {
         });
         let line = line.inner.on_disabled_hover_text("Not available now");
         line.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &self.label));
-        if self.hint.is_empty() {
-            line
-        } else {
-            line.on_hover_text(self.hint)
-        }
+        hinted(line, self.hint)
     }
 }
 
@@ -152,7 +158,7 @@ fn palette_ui(ui: &Ui, palette: &mut Palette, offers: &[Offer]) -> Option<Reply>
             .desired_width(f32::INFINITY);
         let field = ui.add(field);
         field.widget_info(|| WidgetInfo::labeled(Role::SearchInput, true, "Action"));
-        field.request_focus();
+        take_focus(ui, &field);
         if field.changed() {
             palette.marked = 0;
         }
@@ -182,7 +188,12 @@ fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
     let words: Vec<_> = typed.split_whitespace().map(str::to_lowercase).collect();
     let has_words = |text: &str| words.iter().all(|word| text.to_lowercase().contains(word));
     let mut found = Vec::new();
-    for Offer { command, is_possible } in offers {
+    for Offer {
+        command,
+        is_possible,
+        of,
+    } in offers
+    {
         let About { name, keys, hint } = command.about();
         let is_named = has_words(&name);
         if is_named || has_words(&format!("{name} {hint}")) {
@@ -190,15 +201,18 @@ fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
                 // The accessible name leaves out the keys.
                 label: name.clone(),
                 name,
-                right: keys.map_or(String::new(), |keys| ui.ctx().format_shortcut(&keys)),
+                right: match (of, keys) {
+                    (Some(view), _) => view.name().to_owned(),
+                    (None, keys) => keys.map_or(String::new(), |keys| ui.ctx().format_shortcut(&keys)),
+                },
                 hint,
-                reply: is_possible.then(|| Reply::Do(command.clone())),
+                reply: is_possible.then(|| Reply::Do(command.clone(), *of)),
             };
-            found.push(((!is_possible, !is_named), line));
+            found.push(((!is_possible, !is_named, of.is_some()), line));
         }
     }
     found.sort_by_key(|(rank, _)| *rank);
-    let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
+    let terms = glossary::groups().into_iter().flat_map(|(_, terms)| terms);
     let terms = terms.filter(|term| !words.is_empty() && has_words(term.name));
     let terms = terms.map(|term| Line {
         name: term.name.to_owned(),
@@ -215,11 +229,15 @@ mod tests {
     use eframe::egui::{Context, RawInput};
 
     use super::*;
-    use crate::window::shared::ViewKind;
 
     #[test]
     fn words_in_any_order_find_a_command_and_available_ones_come_first() {
-        let offer = |command, is_possible| Offer { command, is_possible };
+        let of = None;
+        let offer = |command, is_possible| Offer {
+            command,
+            is_possible,
+            of,
+        };
         let offers = [
             offer(Command::StopTraining, false),
             offer(Command::Train, true),

@@ -1,7 +1,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    sync::Arc,
     time::Duration,
 };
 
@@ -12,16 +11,15 @@ use decoupler_core::{
 use decoupler_files::{
     export::{WriteError, atomic_write},
     figure::SequentialMap,
-    import::Plan,
     machine::{memory_budget, system_cause},
 };
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de::DeserializeOwned, ser::Error as _};
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
 
 use super::DecouplerWindow;
 use crate::window::{
     job::{Background, JobError, Wake},
-    shared::{Matter, SourceKind},
+    shared::{Matter, OpenPlan, SourceKind},
 };
 
 /// Default size of the window, in points.
@@ -37,40 +35,28 @@ pub(super) const MIN_SIZE_POINTS: [f32; 2] = [960.0, 640.0];
 #[serde(default)]
 pub(super) struct Remembered {
     /// The theme, if the user has chosen one.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) is_dark: Option<bool>,
     /// Colours of values, if the user has chosen them.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) colours: Option<SequentialMap>,
     /// The name of the current view.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) view: Option<String>,
     /// The settings of the next training on a simulated array.
-    #[serde(serialize_with = "write_draft", deserialize_with = "read_draft")]
     pub(super) draft: Option<RunSettings>,
     /// Source of the next training.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) source: Option<SourceKind>,
     /// Settings of the next training on a recording.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) recording: Option<RunSettings>,
     /// Whether they are chosen automatically.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) is_auto: Option<bool>,
     /// Plan of the recording that is open, with absolute paths.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) plan: Option<OpenPlan>,
     /// Width and height of the window.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) size_points: Option<[f32; 2]>,
     /// Interface scale relative to the default, if the user has chosen one.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) scale: Option<f32>,
     /// Width of the column on the left, if the user has changed it.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) form_points: Option<f32>,
     /// As for the column on the right.
-    #[serde(deserialize_with = "if_readable")]
     pub(super) report_points: Option<f32>,
 }
 
@@ -114,7 +100,19 @@ impl Remembered {
             return Some(Self::default());
         };
         let text = (found.len() <= LARGEST_BYTES).then(|| fs::read(path).ok()).flatten()?;
-        let mut read: Self = serde_json::from_slice(&text).ok()?;
+        let values: Map<String, Value> = serde_json::from_slice(&text).ok()?;
+        let mut read = json!({});
+        for (name, mut value) in values {
+            // As version 0.1.0 wrote the settings of an array.
+            if let Some(source) = value.get_mut("source").filter(|source| source.get("sensor").is_some()) {
+                *source = json!({ "simulated": source.take() });
+            }
+            let before = std::mem::replace(&mut read[&name], value);
+            if Self::deserialize(&read).is_err() {
+                read[&name] = before;
+            }
+        }
+        let mut read = Self::deserialize(&read).ok()?;
         read.draft = read.draft.filter(is_within_limits);
         Some(read)
     }
@@ -142,53 +140,6 @@ impl Remembered {
     pub(super) fn take_size_points(&mut self, size: [f32; 2]) {
         self.size_points = Some(size.map(f32::round));
     }
-}
-
-/// The plan of the open recording. It is shared with the settings of the next training, so that a frame neither copies nor
-/// compares it.
-#[derive(Clone, Debug)]
-pub(super) struct OpenPlan(pub(super) Arc<Plan>);
-
-impl PartialEq for OpenPlan {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0) || self.0 == other.0
-    }
-}
-
-impl Serialize for OpenPlan {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.0.serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for OpenPlan {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Plan::deserialize(deserializer).map(|plan| Self(Arc::new(plan)))
-    }
-}
-
-/// Returns the value, or none if it cannot be read as what this program writes.
-fn if_readable<'de, D: Deserializer<'de>, T: DeserializeOwned>(deserializer: D) -> Result<Option<T>, D::Error> {
-    let value = Value::deserialize(deserializer)?;
-    Ok(serde_json::from_value(value).ok())
-}
-
-/// Writes the settings of an array with its simulation in the place of the source, as every version has written them.
-fn write_draft<S: Serializer>(draft: &Option<RunSettings>, serializer: S) -> Result<S::Ok, S::Error> {
-    let mut value = serde_json::to_value(draft).map_err(S::Error::custom)?;
-    if let Some(source) = value.get_mut("source") {
-        *source = source["simulated"].take();
-    }
-    value.serialize(serializer)
-}
-
-/// Reads what [`write_draft`] writes; none if it cannot be read.
-fn read_draft<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<RunSettings>, D::Error> {
-    let mut value = Value::deserialize(deserializer)?;
-    if let Some(source) = value.get_mut("source") {
-        *source = json!({ "simulated": source.take() });
-    }
-    Ok(serde_json::from_value(value).ok())
 }
 
 /// Returns `true` if the settings could be trained with on this machine.
@@ -285,7 +236,7 @@ impl DecouplerWindow {
             recording: Some(shared.recording.settings),
             is_auto: Some(shared.recording.is_auto),
             plan: match &shared.recording.plan {
-                Ok(plan) => Some(OpenPlan(Arc::clone(plan))),
+                Ok(plan) => Some(plan.clone()),
                 // An import that is incomplete now may be completed later.
                 Err(_) if self.views.has_recording() => memory.latest.plan.take(),
                 Err(_) => None,

@@ -209,7 +209,7 @@ fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
     window.wait(|window| {
         window
             .shared
-            .test()
-            .is_some_and(|test| test.sensor == impossible.simulation().unwrap().sensor)
+            .skin()
+            .is_some_and(|skin| skin.sensor == impossible.simulation().unwrap().sensor)
     });
 }

@@ -1,29 +1,36 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use decoupler_files::export::exit_leaving_nothing;
-use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui, UiBuilder};
+use eframe::egui::{
+    self, ColorImage, Context, Event, Frame as PanelFrame, Margin, Panel, Rangef, Ui, UiBuilder, ViewportCommand, vec2,
+};
 
 use super::{
-    clipboard::Copying,
     commands::{DraftsUndoer, SCALES, drafts},
     export_dialog::{card_menu_ui, export_menu_ui},
     files::{Dialogs, Files},
     modal::Modal,
     notices::Notices,
     remembered::{Memory, Remembered, WindowFile},
-    top_bar::{edge_ui, top_bar_ui, widths_points},
+    top_bar::top_bar_ui,
 };
 use crate::{
     signals::on_termination,
     window::{
         job::{Background, Wake},
         preview::PreviewEvent,
-        shared::{Command, Effect, Matter, Notice, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
+        shared::{
+            Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status,
+        },
         theme::{self, Theme, space},
         training_worker::{Request, Worker},
         views::Views,
+        widgets::focus_ring_ui,
     },
 };
+
+/// A picture to be copied, and the message for the user.
+pub(super) type Drawn = Result<(ColorImage, String), String>;
 
 /// The window: the shared state, the views, and the one place where their effects are applied.
 pub struct DecouplerWindow {
@@ -39,8 +46,11 @@ pub struct DecouplerWindow {
     pub(super) keeping: Option<(PathBuf, Duration)>,
     pub(super) previews: Background<PreviewEvent>,
     pub(super) runs: RunsWorker,
+    /// The run of the list that is being opened, the last one after the start if not one that the user chose.
+    pub(super) opening: Background<(bool, Result<Box<RunView>, String>)>,
     pub(super) files: Files,
-    pub(super) copying: Copying,
+    /// Pictures that are drawn to be copied; the newest wins.
+    pub(super) pictures: Background<Drawn>,
     pub(super) dialogs: Dialogs,
     /// Command picked from the list or by a button, which is carried out in the next frame.
     pub(super) picked: Option<Command>,
@@ -53,6 +63,8 @@ pub struct DecouplerWindow {
     pub(super) ctx: Context,
     /// Files that the window was opened with.
     pub(super) given: Vec<PathBuf>,
+    /// True until the first frame.
+    is_new: bool,
 }
 
 impl DecouplerWindow {
@@ -84,8 +96,8 @@ impl DecouplerWindow {
         }
         shared.source = remembered.source.unwrap_or_default();
         if let Some(plan) = remembered.plan.take() {
-            views.open_plan(&plan.0);
-            shared.recording.plan = Ok(plan.0);
+            views.open_plan(&plan);
+            shared.recording.plan = Ok(plan);
         }
         let shown = ViewKind::ALL
             .into_iter()
@@ -101,8 +113,9 @@ impl DecouplerWindow {
             keeping: None,
             previews: Background::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
+            opening: Background::new("opened run", Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
-            copying: Copying::new(desktop, Arc::clone(&wake)),
+            pictures: Background::prompt("picture", Arc::clone(&wake)),
             dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
             picked: None,
             undoer: DraftsUndoer::default(),
@@ -111,6 +124,7 @@ impl DecouplerWindow {
             wake,
             ctx: ctx.clone(),
             given: Vec::new(),
+            is_new: true,
         };
         if let Some(damage) = damage {
             window.notices.fail(Matter::Memory, damage);
@@ -181,6 +195,9 @@ impl DecouplerWindow {
         if ui.input(|input| input.events.contains(&Event::WindowFocused(true))) {
             self.runs.ask(RunsRequest::Look);
         }
+        if std::mem::take(&mut self.is_new) {
+            self.fit_the_screen();
+        }
         let mut effects = Vec::new();
         let offers = self.take_commands(ui.ctx(), &mut effects);
         self.take_dropped(ui.ctx());
@@ -188,8 +205,12 @@ impl DecouplerWindow {
         let view = self.views.get(kind);
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
-        let columns = kind.columns(ui.available_width());
-        let [form_width, report_width] = widths_points(&columns, &self.chosen, ui.available_width());
+        // Widths of the columns at which their names do not touch their values, and at which the table fits.
+        let [form_min, report_min] = [space(62), space(82)];
+        let has_report = shared.has_report(ui.available_width());
+        // Wider columns must leave the middle this width.
+        let within = |min: f32, max: f32, room: f32| Rangef::new(min, (room - space(176)).clamp(min, max));
+        let for_form = ui.available_width() - if has_report { report_min } else { 0.0 };
         // The strip of the scroll bar is the margin on the right.
         let side = Margin {
             left: 12,
@@ -202,26 +223,35 @@ impl DecouplerWindow {
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
                 top_bar_ui(ui, kind, &offers, |ui| {
-                    export_menu_ui(ui, || view.shown(shared), &mut effects);
                     view.tools_ui(ui, shared, &mut effects);
+                    export_menu_ui(ui, || view.shown(shared), &mut effects);
                 })
             });
         let status_line = Panel::bottom("status line")
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
             .show(ui, |ui| ui.max_rect());
-        let form = Panel::left("configuration")
-            .exact_size(form_width)
-            .resizable(false)
+        // A narrow window does not change the width in a wide one.
+        let is_narrow = ui.available_width() < 1400.0;
+        let form = Panel::left(if is_narrow { "narrow form" } else { "form" })
+            .default_size(self.chosen.form_points.unwrap_or(space(68)))
+            .size_range(within(form_min, space(110), for_form))
             .frame(panel(side))
-            .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
-        let report = columns.has_report.then(|| {
+            .show(ui, |ui| view.form_ui(&mut inside(ui), shared, &mut effects));
+        if !is_narrow {
+            self.chosen.form_points = Some(form.response.rect.width());
+        }
+        let report = has_report.then(|| {
+            let for_report = ui.available_width();
             Panel::right("report")
-                .exact_size(report_width)
-                .resizable(false)
+                .default_size(self.chosen.report_points.unwrap_or(space(96)))
+                .size_range(within(report_min, space(140), for_report))
                 .frame(panel(side))
-                .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
+                .show(ui, |ui| view.report_ui(&mut inside(ui), shared, &mut effects))
         });
+        if let Some(report) = &report {
+            self.chosen.report_points = Some(report.response.rect.width());
+        }
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
         let middle = egui::CentralPanel::default()
             .frame(background)
@@ -232,16 +262,11 @@ impl DecouplerWindow {
         for part in parts.into_iter().flatten() {
             card_menu_ui(part, || view.shown(shared), &mut effects);
         }
-        edge_ui(
-            ui,
-            "Width of the left column",
-            form.response.rect,
-            true,
-            &mut self.chosen.form_points,
-        );
-        if let Some(report) = report {
-            let width = &mut self.chosen.report_points;
-            edge_ui(ui, "Width of the right column", report.response.rect, false, width);
+        let focused = ui.memory(|memory| memory.focused());
+        let focused = focused.and_then(|id| ui.ctx().read_response(id));
+        // The edge of a column.
+        if let Some(edge) = focused.filter(|focused| focused.rect.height() >= form.response.rect.height()) {
+            focus_ring_ui(ui, &edge);
         }
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
@@ -260,12 +285,27 @@ impl DecouplerWindow {
         self.take_close_request();
     }
 
+    /// Fills the screen if the window would reach beyond it with its title bar: its status line would be out of sight.
+    fn fit_the_screen(&self) {
+        let size = self.ctx.content_rect().size() + vec2(0.0, space(18));
+        let screen = self.ctx.input(|input| input.viewport().monitor_size);
+        if screen.is_some_and(|screen| size.x > screen.x || size.y > screen.y) {
+            self.ctx.send_viewport_cmd(ViewportCommand::Maximized(true));
+        }
+    }
+
     /// Applies the effects requested by views.
     pub(super) fn apply_all(&mut self, effects: Vec<Effect>) {
         for effect in effects {
             self.apply(effect);
         }
     }
+}
+
+/// Returns a part of a column that does not widen it.
+fn inside(column: &mut Ui) -> Ui {
+    column.set_min_size(column.available_size());
+    column.new_child(UiBuilder::new().max_rect(column.max_rect()))
 }
 
 /// Returns `true` if the user did something in this frame that parts of the window already drawn may depend on: one
@@ -291,11 +331,11 @@ impl eframe::App for DecouplerWindow {
     }
 }
 
-/// Services of the desktop that the window uses: file dialogs and the clipboard.
+/// The file dialogs that the window uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Desktop {
     /// The desktop's own.
     Native,
-    /// None: the window asks for paths itself, and copies stay within the toolkit. For tests.
+    /// None: the window asks for paths itself. For tests.
     None,
 }

@@ -1,58 +1,11 @@
 //! Heat maps, whose cells answer to the pointer.
 
-use decoupler_files::{
-    export::format_number,
-    figure::{HeatMap, HeatMapDrawing},
-};
-use eframe::egui::{Color32, CursorIcon, Rect, Response, Sense, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role};
+use decoupler_files::{export::format_number, figure::HeatMap};
+use eframe::egui::{Color32, Rect, Response, Sense, Stroke, StrokeKind, Ui, WidgetInfo, accesskit::Role};
 
 use super::paint::{bounds, measure, paint_over, rect, to_glam};
-use crate::window::theme::Theme;
 
-/// Click or hover on a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CellPointed {
-    /// Clicked.
-    Once,
-    /// Double-clicked.
-    Twice,
-}
-
-/// Paints the map in the remaining space.
-fn map_ui(ui: &mut Ui, map: &HeatMap) -> HeatMapDrawing {
-    let (whole, _) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
-    let painter = ui.painter();
-    let drawing = map.lay_out(bounds(whole), &|text| measure(painter, text));
-    paint_over(ui, whole.intersect(ui.clip_rect()), &drawing.shapes);
-    drawing
-}
-
-/// Draws the map in the remaining space, with an optional `marked` cell; returns the cell (row, column) that the user clicked.
-pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Option<([usize; 2], CellPointed)> {
-    let drawing = map_ui(ui, map);
-    let mut pointed = None;
-    for ((row, column), note) in map.notes.indexed_iter() {
-        let cell = rect(drawing.cells([row, 1], [column, 1]));
-        let response = ui.interact(cell, ui.scope_id().with(("heat", row, column)), Sense::click());
-        let is_marked = marked == Some([row, column]);
-        response.widget_info(|| {
-            let name = note.lines().next().unwrap_or_default();
-            WidgetInfo::selected(Role::Button, true, is_marked, name)
-        });
-        let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(note);
-        pointed = match (response.double_clicked(), response.clicked()) {
-            (true, _) => Some(([row, column], CellPointed::Twice)),
-            (false, true) => Some(([row, column], CellPointed::Once)),
-            (false, false) => pointed,
-        };
-        if is_marked {
-            outline(ui, cell, Theme::of(ui).palette.text);
-        }
-    }
-    pointed
-}
-
-/// Draws a live map in the remaining space, as a picture called `label`, however many cells there are. `marked` are the
+/// Draws a map in the remaining space, as a picture called `label`, however many cells there are. `marked` are the
 /// rows and columns to highlight, from 0, and their colour. Returns the cell (row, column) under the pointer.
 pub fn cells_ui(
     ui: &mut Ui,
@@ -60,7 +13,10 @@ pub fn cells_ui(
     map: &HeatMap,
     marked: (&[usize], &[usize], Color32),
 ) -> Option<([usize; 2], Response)> {
-    let drawing = map_ui(ui, map);
+    let (whole, _) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
+    let painter = ui.painter();
+    let drawing = map.lay_out(bounds(whole), &|text| measure(painter, text));
+    paint_over(ui, whole.intersect(ui.clip_rect()), &drawing.shapes);
     let grid = rect(drawing.grid);
     // A click selects a cell; keyboard selection is handled elsewhere.
     let response = ui.interact(grid, ui.scope_id().with(("cells", label)), Sense::HOVER | Sense::CLICK);

@@ -7,7 +7,7 @@ use eframe::egui::{
     WidgetInfo, accesskit::Role,
 };
 use egui_plot::{
-    AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
+    AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, FilledArea, GridInput, GridMark, HLine, HoverPosition, Line,
     LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span, VLine,
 };
 
@@ -17,23 +17,15 @@ use crate::window::{
     widgets::{dim_ui, focus_ring_ui},
 };
 
-/// Opacity of a shaded span of an axis.
+/// Opacity of a shaded span of an axis, and of a band.
 const SPAN_TINT: f32 = 0.12;
+const BAND_TINT: f32 = 0.22;
 /// Room for the number at a tick, in points.
 const NUMBER: [f64; 2] = [50.0, 16.0];
 /// Minimum distance of grid lines, in points; the plot derives its scale from it.
 const MIN_GRID: f32 = 8.0;
 /// Points of a stepped line that are closer than this fraction of an axis are merged: a sharp turn would draw a spike.
 const COINCIDENT: f64 = 5e-4;
-
-/// Response of a plot to the pointer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pointer {
-    /// The pointer pans and zooms the plot and shows the tooltip of a point.
-    Moves,
-    /// The points and bars respond to the pointer.
-    Picks,
-}
 
 /// Plot drawn on the screen.
 pub struct DrawnPlot<'a> {
@@ -45,6 +37,8 @@ pub struct DrawnPlot<'a> {
     pub hovered: Option<usize>,
     /// Index of the item that was clicked in this frame.
     pub clicked: Option<usize>,
+    /// Its response to the pointer.
+    pub response: Response,
     transform: PlotTransform,
 }
 
@@ -53,6 +47,11 @@ impl DrawnPlot<'_> {
     pub fn position(&self, x: f64, y: f64) -> Option<Pos2> {
         let [x, y] = self.plot.place(x, y)?;
         Some(self.transform.position_from_point(&Place::new(x, y)))
+    }
+
+    /// Returns the place on the horizontal axis of a screen position.
+    pub fn place_at(&self, at: Pos2) -> f64 {
+        self.transform.value_from_position(at).x
     }
 
     /// Returns the item at a screen position: the bar there, or the nearest point within reach.
@@ -82,15 +81,20 @@ impl DrawnPlot<'_> {
 /// Draws a title and the plots.
 pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
     ui.label(RichText::new(title).font(semibold(type_size().title)));
-    plots_ui(ui, title, figure, Pointer::Moves);
+    plots_ui(ui, title, figure);
 }
+
+/// Room for the names and the numbers of plots below each other, and for their horizontal axis.
+const NAME: f32 = space(18);
+const NUMBERS: f32 = space(12);
+const AXIS: f32 = space(9);
 
 /// Minimum width of the legend and the notes next to a square plot.
 const NOTES_WIDTH: f32 = space(48);
 
 /// Draws the plots side by side in the remaining space, and the legend and the notes: next to a square plot if there is room,
 /// else above.
-pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
+pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnPlot<'a>> {
     let head_ui = |ui: &mut Ui| {
         legend_ui(ui, figure);
         for note in &figure.notes {
@@ -110,22 +114,50 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
         // Apart from the numbers at the axes.
         width = width.min(whole.height() + space(3));
     }
+    let height = (whole.height() - AXIS) / count;
     let slot = |index: usize| {
+        if figure.is_stacked {
+            let top = whole.top() + height * index as f32;
+            let is_last = index + 1 == figure.plots.len();
+            let bottom = if is_last {
+                whole.bottom()
+            } else {
+                top + height - space(2)
+            };
+            return Rect::from_x_y_ranges(whole.x_range(), top..=bottom);
+        }
         let left = whole.left() + (width + space(3)) * index as f32;
         Rect::from_min_size([left, whole.top()].into(), Vec2::new(width, whole.height()))
     };
+    let widths = figure
+        .plots
+        .iter()
+        .map(|plot| measure(ui.painter(), &plot.y.name).x + space(6));
+    let names = widths.fold(0.0, f32::max).min(NAME);
     let plots = figure.plots.iter().enumerate().map(|(index, plot)| {
-        let mut slot = ui.new_child(UiBuilder::new().max_rect(slot(index)));
-        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, pointer);
+        let is_last = index + 1 == figure.plots.len();
+        let mut slot = slot(index);
+        if figure.is_stacked {
+            let place = slot.with_max_x(slot.left() + names).shrink2(Vec2::new(0.0, space(2)));
+            let name = Label::new(RichText::new(&plot.y.name).size(type_size().note)).wrap();
+            let mut beside = ui.new_child(UiBuilder::new().max_rect(place));
+            beside.set_clip_rect(place);
+            beside.add(name);
+            slot.min.x += names;
+        }
+        let track = figure.is_stacked.then_some(is_last);
+        let mut slot = ui.new_child(UiBuilder::new().max_rect(slot));
+        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, track);
         let mut drawn = DrawnPlot {
             plot,
             has_pointer: response.contains_pointer(),
             hovered: None,
             clicked: None,
+            response,
             transform,
         };
-        drawn.hovered = response.hover_pos().and_then(|at| drawn.item_at(at));
-        drawn.clicked = drawn.hovered.filter(|_| response.clicked());
+        drawn.hovered = drawn.response.hover_pos().and_then(|at| drawn.item_at(at));
+        drawn.clicked = drawn.hovered.filter(|_| drawn.response.clicked());
         drawn
     });
     let plots = plots.collect();
@@ -147,6 +179,10 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = space(1);
         for (name, look) in keys {
+            // A line and its name stay together.
+            if ui.available_size_before_wrap().x < 1.2 * measure(ui.painter(), name).x + space(7) {
+                ui.end_row();
+            }
             let (place, _) = ui.allocate_exact_size(Vec2::splat(space(4)), Sense::hover());
             paint(
                 ui.painter(),
@@ -159,8 +195,9 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
     });
 }
 
-/// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window.
-fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
+/// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window. `track` is whether a plot among
+/// several below each other is the last one, which has the horizontal axis of all.
+fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
@@ -174,7 +211,13 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
             .tick_label_color(palette.dim)
             .tick_label_font(FontId::proportional(type_size().small))
     };
-    let may_move = pointer == Pointer::Moves;
+    // Plots below each other are moved together by whoever draws them.
+    let may_move = track.is_none();
+    let mut y_hints = axis_hints(AxisHints::new_y(), &plot.y, 12.0);
+    if track.is_some() {
+        // The names are beside the plots, and their frames are below each other.
+        y_hints = y_hints.label("").min_thickness(NUMBERS);
+    }
     // A menu over the plot is not covered by tooltips.
     let is_covered = Popup::is_any_open(ui.ctx());
     let mut shown = egui_plot::Plot::new(id)
@@ -182,8 +225,8 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
         .width(space.x)
         .height(space.y)
         .custom_x_axes(vec![axis_hints(AxisHints::new_x(), &plot.x, 24.0)])
-        .custom_y_axes(vec![axis_hints(AxisHints::new_y(), &plot.y, 12.0)])
-        .show_axes([true, plot.y.scale != Scale::Hidden])
+        .custom_y_axes(vec![y_hints])
+        .show_axes([track != Some(false), plot.y.scale != Scale::Hidden])
         .x_grid_spacer(|input| marks(&plot.x, &input, NUMBER[0]))
         .y_grid_spacer(|input| marks(&plot.y, &input, NUMBER[1]))
         .grid_spacing(Rangef::new(MIN_GRID, 300.0))
@@ -193,6 +236,7 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
         .allow_drag(may_move)
         .allow_zoom(may_move)
         .allow_boxed_zoom(may_move)
+        .allow_double_click_reset(may_move)
         .show_crosshair(false)
         .label_formatter(|position| tooltip_at(plot, position).filter(|_| may_move && !is_covered))
         .set_margin_fraction(Vec2::ZERO)
@@ -204,6 +248,9 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
         shown = shown.data_aspect(1.0);
     }
     let shown = shown.show(ui, |plot_ui| {
+        if let (Some(_), [.., from, to]) = (track, &plot.x.includes[..]) {
+            plot_ui.set_plot_bounds_x(*from..=*to);
+        }
         lines_behind(plot_ui, plot, &palette);
         for series in &plot.series {
             draw_series(plot_ui, plot, series, &palette);
@@ -287,6 +334,14 @@ fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
 fn draw_series(plot_ui: &mut PlotUi<'_>, plot: &Plot, series: &Series, palette: &Palette) {
     let name = &*series.name;
     let colour = colour(series.look.ink, palette);
+    if series.form == Form::Band {
+        for band in plot.bands(series) {
+            let [xs, low, high] = [0, 1, 2].map(|part| Vec::from_iter(band.iter().map(|ends| ends[part])));
+            let area = FilledArea::new(name, &xs, &low, &high).fill_color(colour.gamma_multiply(BAND_TINT));
+            plot_ui.add(area.allow_hover(false));
+        }
+        return;
+    }
     let [x_range, y_range] = plot.ranges();
     let (width, height) = (x_range.end() - x_range.start(), y_range.end() - y_range.start());
     if let Form::Bars(bar_width) = series.form {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use eframe::egui::{Context, Pos2, RawInput, Rect, Shape, Ui, pos2, vec2};
+use eframe::egui::{Color32, Context, Pos2, RawInput, Rect, Shape, Ui, pos2, vec2};
 use resvg::usvg::roxmltree::Document;
 
 use super::*;
@@ -22,7 +22,7 @@ use decoupler_core::{
     training::EpochRecord,
 };
 use decoupler_files::figure::{
-    Decoded, EpochOutline, Figure, RegressionLine, TradeOffLevel, TradeOffLimits, compared_losses_figure,
+    Decoded, EpochOutline, Figure, RegressionLine, TradeOffCost, TradeOffLevel, TradeOffLimits, compared_losses_figure,
     experiment_figure, histogram_figure, loss_figure, node_figure, regression_figure, singular_values_figure,
     trade_off_figure, training_state_figure, value_pairs,
 };
@@ -77,10 +77,10 @@ fn shapes_on_screen(figure: &Figure, mut look: impl FnMut(&Shape)) {
         };
         let draw = |ui: &mut Ui| match figure {
             Figure::Plots(plots) => {
-                plots_ui(ui, "figure", plots, Pointer::Moves);
+                plots_ui(ui, "figure", plots);
             }
             Figure::HeatMap(map) => {
-                heat_map_ui(ui, map, None);
+                cells_ui(ui, "map", map, (&[], &[], Color32::WHITE));
             }
             Figure::Surfaces(_) => unreachable!("surfaces have tests of their own"),
         };
@@ -179,7 +179,7 @@ fn figures_of_a_training_are_the_same_on_screen_and_in_print() {
     let decoupled_mm = run.decouple_test();
     let pairs_mm = value_pairs(run.test(), &decoupled_mm, None);
     let line = RegressionLine::of(pairs_mm.iter().copied());
-    same("histogram", histogram_figure(&pairs_mm, None, Decoded::Nodes));
+    same("histogram", histogram_figure(&pairs_mm, Decoded::Nodes));
     let regression = same(
         "regression",
         regression_figure((pairs_mm.len(), &|pair| pairs_mm[pair]), &line, Decoded::Nodes),
@@ -247,7 +247,15 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
         percent: 50.0,
         microseconds: 1e9,
     };
-    let trade_off = same("trade-off", trade_off_figure(&level, &limits));
+    let figure = trade_off_figure(&level, &limits);
+    // A click on a point marks the decoder that it shows.
+    for (point, item) in { figure.plots[0].series.iter() }
+        .flat_map(|series| &series.points)
+        .filter_map(|of| Some((of, of.item?)))
+    {
+        assert_eq!((point.x, point.y), TradeOffCost::Decoding.of(&level.points[item]));
+    }
+    let trade_off = same("trade-off", figure);
     let note = "Discs: paper preset, diamonds: best preset, hollow: 32 bits.";
     for word in ["Network", note, "Pareto front"] {
         assert!(trade_off.words.contains(word), "{word}: {trade_off:?}");

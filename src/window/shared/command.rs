@@ -4,9 +4,10 @@ use decoupler_files::figure::SequentialMap;
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
 use super::ViewKind;
+use crate::window::test_view::HeightScale;
 
 /// Something that the user can do by a key, or by picking it from the list of all commands.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Command {
     // Of the Train view.
     Train,
@@ -15,6 +16,7 @@ pub enum Command {
     ResumeTraining,
     StopTraining,
     OpenFiles,
+    DecodeFile,
     PressMiddle,
     NextSample,
     PreviousSample,
@@ -38,9 +40,7 @@ pub enum Command {
     Dark,
     Light,
     Colours(SequentialMap),
-    LockHeights,
-    FreeHeights,
-    FreeErrors,
+    Scale(&'static str, HeightScale, Option<f64>),
     Larger,
     Smaller,
     UsualSize,
@@ -68,12 +68,25 @@ impl Command {
         let ctrl = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND, key));
         let shift = Modifiers::COMMAND | Modifiers::SHIFT;
         let (name, keys, hint) = match self {
-            Self::Train => ("Train", ctrl(Key::Enter), "Start training a network."),
-            Self::TrainLonger => ("Train longer", None, "Continue from the current weights."),
+            Self::Train => (
+                "Train",
+                ctrl(Key::Enter),
+                "Start training a network from random weights.",
+            ),
+            Self::TrainLonger => (
+                "Train longer",
+                None,
+                "Continue from the current weights with the method and the epochs on the left, counted from here.",
+            ),
             Self::PauseTraining => ("Pause training", ctrl(Key::P), ""),
             Self::ResumeTraining => ("Resume training", ctrl(Key::P), ""),
             Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
             Self::OpenFiles => ("Open files", None, "A recording, recipe, network or checkpoint."),
+            Self::DecodeFile => (
+                "Decode file",
+                None,
+                "All rows of another file, with the network, to CSV.",
+            ),
             Self::PressMiddle => ("Press the middle of the surface", None, "Touch the sensor."),
             Self::NextSample => ("Next test sample", plain(Key::PageDown), ""),
             Self::PreviousSample => ("Previous test sample", plain(Key::PageUp), ""),
@@ -99,9 +112,7 @@ impl Command {
             Self::Dark => ("Dark theme", None, ""),
             Self::Light => ("Light theme", None, ""),
             Self::Colours(map) => (map.name(), None, map.meaning()),
-            Self::LockHeights => ("Lock the scale of heights", None, "The same colours on every surface."),
-            Self::FreeHeights => ("Free the scale of heights", None, "Colours span the displayed heights."),
-            Self::FreeErrors => ("Free the scale of errors", None, "Colours span the displayed errors."),
+            Self::Scale(name, ..) => (*name, None, "Colours of the displayed heights or errors."),
             Self::Larger => ("Larger interface", ctrl(Key::Plus), "Zoom in."),
             Self::Smaller => ("Smaller interface", ctrl(Key::Minus), "Zoom out."),
             Self::UsualSize => ("Reset the interface size", ctrl(Key::Num0), "Zoom to 100 %."),
@@ -124,13 +135,25 @@ impl Command {
     }
 }
 
+impl About {
+    /// Returns the tooltip of its button: "Stop training (Ctrl+.)", with the Command key on macOS.
+    pub fn tooltip(&self, ctx: &Context) -> String {
+        let Self { name, keys, hint } = self;
+        let keys = keys.map_or(String::new(), |keys| format!(" ({})", ctx.format_shortcut(&keys)));
+        let gap = if hint.is_empty() { "" } else { "\n" };
+        format!("{name}{keys}{gap}{hint}")
+    }
+}
+
 /// A command that is listed now.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Offer {
     /// The command.
     pub command: Command,
     /// False if it is not available now.
     pub is_possible: bool,
+    /// The view that must be shown first, if it is another one.
+    pub of: Option<ViewKind>,
 }
 
 /// The commands of this frame. The caller that offers a command carries it out when [`Self::offer`] returns true: its keys were
@@ -166,7 +189,12 @@ impl<'a> Offers<'a> {
         };
         let keys = command.about().keys.filter(may_hear);
         let is_pressed = keys.is_some_and(|keys| self.ctx.input_mut(|input| input.consume_shortcut(&keys)));
-        self.list.push(Offer { command, is_possible });
+        let of = None;
+        self.list.push(Offer {
+            command,
+            is_possible,
+            of,
+        });
         is_possible && (is_picked || is_pressed)
     }
 

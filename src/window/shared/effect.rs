@@ -1,12 +1,9 @@
 use std::{path::PathBuf, sync::Arc};
 
 use decoupler_core::{evaluation::RunSettings, training::TrainerState};
-use decoupler_files::{
-    export::NetworkFile,
-    import::{Plan, Setup},
-};
+use decoupler_files::import::{Plan, Setup};
 
-use super::{Exporting, FileTask, Look, SourceKind, ToCopy};
+use super::{Exporting, FileTask, Look, RunsRequest, SourceKind, ToCopy, ViewKind};
 
 /// Request of a view to the window, which applies all of them in one place once everything is drawn.
 #[derive(Clone, Debug)]
@@ -23,8 +20,10 @@ pub enum Effect {
     ChooseSource(SourceKind),
     /// Use the setup of another run for the next training.
     TakeSetup(Box<Setup>),
-    /// Show the Train view.
-    ShowTraining,
+    /// Show this view.
+    Show(ViewKind),
+    /// Show the run of the list with this number in the Train view, with its settings.
+    OpenRun(u64),
     /// Begin training.
     Train,
     /// Open the training saved in this checkpoint.
@@ -37,6 +36,8 @@ pub enum Effect {
     Resume,
     /// Stop it.
     Stop,
+    /// Answer with ridge regression in place of the network of the ended training.
+    UseRidge,
     /// Continue from the current weights with the method and the epochs of the settings.
     Continue,
     /// Set the look of all surfaces.
@@ -47,14 +48,8 @@ pub enum Effect {
     Export(Box<Exporting>),
     /// Put this on the clipboard; then the text tells the user.
     Copy(ToCopy, String),
-    /// Keep the run of a network file that was opened.
-    KeepRun(Box<NetworkFile>),
-    /// Rename the kept run with this number.
-    RenameRun(u64, String),
-    /// Show the kept run with this number in one of the two places, or nothing.
-    PinRun(usize, Option<u64>),
-    /// Remove the run with this number.
-    RemoveRun(u64),
+    /// Change the run list.
+    ChangeRuns(RunsRequest),
     /// Show a notice to the user.
     Notify(Matter, Notice),
     /// Withdraw the failures of this subject, which have been resolved.

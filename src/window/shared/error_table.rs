@@ -3,18 +3,16 @@
 use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{ErrorMeasure, ErrorRow, ErrorTable},
+    problem::Channel,
 };
 use decoupler_files::export::{format_number, format_r2};
 use eframe::egui::Ui;
 
 use crate::window::{
     glossary::{self, Term},
-    theme::{Theme, space},
-    widgets::{TableCell, TableColumn, TableRow, TableView},
+    theme::Theme,
+    widgets::{TableCell, TableColumn, TableRow, TableView, dim_ui},
 };
-
-/// Measures of intervals, which have a table of their own.
-const OF_INTERVALS: [ErrorMeasure; 2] = [ErrorMeasure::HalfWidth, ErrorMeasure::CoveragePercent];
 
 /// Meaning of the mark at a baseline.
 const BETTER: &str = "Better than what is used.";
@@ -32,16 +30,27 @@ fn column(measure: ErrorMeasure) -> TableColumn<'static> {
     }
 }
 
-/// Lays out an error table: rows of baselines, network, model-based and published figures, for recordings target by target;
-/// below, the intervals of the network, if they were calibrated.
+/// Lays out an error table: rows of baselines, network, model-based and published figures, for recordings target by target.
 pub fn error_table_ui(ui: &mut Ui, tables: &[ErrorTable]) {
     let Some(ErrorTable { measures, .. }) = tables.first() else {
         return;
     };
     let palette = Theme::of(ui).palette;
-    // The worst node is shown below the table.
-    let is_shown = |measure: ErrorMeasure| measure != ErrorMeasure::WorstMm && !OF_INTERVALS.contains(&measure);
-    let shown = Vec::from_iter((0..measures.len()).filter(|&place| is_shown(measures[place])));
+    // Coordinates that do not vary have errors of rounding only.
+    let is_constant = |place: usize| {
+        let mut errors = tables
+            .iter()
+            .flat_map(|table| &table.rows)
+            .filter_map(|row| row.errors[place]);
+        errors.all(|percent| percent < 1e-3)
+    };
+    let is_shown = |place: &usize| match measures[*place] {
+        // The worst node is shown below the table.
+        ErrorMeasure::WorstMm | ErrorMeasure::HalfWidth | ErrorMeasure::CoveragePercent => false,
+        ErrorMeasure::XPercent | ErrorMeasure::YPercent => !is_constant(*place),
+        _ => true,
+    };
+    let shown = Vec::from_iter((0..measures.len()).filter(is_shown));
     let mut columns = vec![TableColumn::text("")];
     columns.extend(shown.iter().map(|&place| column(measures[place])));
     // The error that decides whether a baseline is better.
@@ -78,33 +87,53 @@ pub fn error_table_ui(ui: &mut Ui, tables: &[ErrorTable]) {
         }
     }
     TableView::new("errors", &columns).show_all(ui, rows);
-    intervals_ui(ui, measures, tables);
 }
 
-/// The half-width of the interval of each target, and its coverage on the test set.
-fn intervals_ui(ui: &mut Ui, measures: &[ErrorMeasure], tables: &[ErrorTable]) {
-    let places = OF_INTERVALS.map(|measure| measures.iter().position(|found| *found == measure));
-    let [Some(half_width), Some(coverage)] = places else {
-        return;
-    };
-    let row = |table: &ErrorTable| {
-        let network = table.rows.iter().find(|row| row.name == table.used())?;
-        let figures = [half_width, coverage].map(|place| network.errors.get(place).copied().flatten());
-        let title = table.target.as_ref()?.title();
-        let cells = [title.clone()].into_iter().chain(figures.map(format_number));
-        figures
-            .iter()
-            .any(Option::is_some)
-            .then(|| TableRow::new(cells.map(TableCell::new)).named(title))
-    };
-    let columns = [
-        TableColumn::text("90 % interval"),
-        TableColumn::figure("half-width ±").meaning(ErrorMeasure::HalfWidth.definition()),
-        TableColumn::figure("coverage, %").meaning(ErrorMeasure::CoveragePercent.definition()),
+/// A line for each target of a recording: the error of what is used next to those of ridge regression and of the mean, R², and
+/// the interval.
+pub fn targets_table_ui(ui: &mut Ui, tables: &[ErrorTable]) {
+    let Some(first) = tables.first() else { return };
+    let (used, palette) = (first.used(), Theme::of(ui).palette);
+    let all = [
+        (used, used, ErrorMeasure::Rmse),
+        ("ridge", "ridge", ErrorMeasure::Rmse),
+        ("mean", "training mean", ErrorMeasure::Rmse),
+        ("R²", used, ErrorMeasure::R2),
+        ("90 % ±", used, ErrorMeasure::HalfWidth),
+        ("holds %", used, ErrorMeasure::CoveragePercent),
     ];
-    ui.add_space(space(2));
-    let rows = tables.iter().filter_map(row).collect();
-    TableView::new("intervals", &columns).show_all(ui, rows);
+    let place = |measure| first.measures.iter().position(|found| *found == measure);
+    let shown = Vec::from_iter(
+        all.into_iter()
+            .filter_map(|(name, row, of)| Some((name, row, of, place(of)?))),
+    );
+    let mut columns = vec![TableColumn::text("")];
+    columns.extend(shown.iter().map(|&(name, row, measure, _)| {
+        let meaning = if measure == ErrorMeasure::Rmse {
+            row_meaning(row)
+        } else {
+            measure.definition()
+        };
+        TableColumn::figure(name).meaning(meaning)
+    }));
+    let rows = tables.iter().map(|table| {
+        let title = table.target.as_ref().map_or_else(String::new, Channel::title);
+        let cells = shown.iter().map(|&(name, row, measure, place)| {
+            let row = table.rows.iter().find(|found| found.name == row);
+            let value = row.and_then(|row| row.errors.get(place).copied().flatten());
+            let text = if measure == ErrorMeasure::R2 {
+                format_r2(value)
+            } else {
+                format_number(value)
+            };
+            let is_used = name == used;
+            let cell = TableCell::new(text).strong(is_used);
+            if is_used { cell.colour(palette.accent) } else { cell }
+        });
+        TableRow::new([TableCell::new(title.clone()).strong(true)].into_iter().chain(cells)).named(title)
+    });
+    TableView::new("targets", &columns).show_all(ui, rows.collect());
+    dim_ui(ui, "RMSE on the test samples: smaller is better.");
 }
 
 /// Definition of a row of the error table.

@@ -14,7 +14,7 @@ use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{DecoderReport, Run},
     job::Job,
-    text::Named,
+    text::{Named, capitalised},
 };
 use decoupler_files::{
     export::{
@@ -29,8 +29,11 @@ use decoupler_files::{
     import::{Recorded, Setup, SetupSets},
 };
 
-use super::Effect;
-use crate::window::training_worker::{PastNetworks, RunId, TrainedRun};
+use super::{Effect, RunView};
+use crate::{
+    terminal::{decode::decode_file, output},
+    window::training_worker::{PastNetworks, RunId, TrainedRun},
+};
 
 /// Something that a view shows and the user can export.
 pub struct Shown<'a> {
@@ -384,6 +387,8 @@ pub enum Purpose {
     Choose(Sender<PathBuf>),
     /// Write it.
     Save(Contents),
+    /// Decode it.
+    Decode(Contents),
 }
 
 /// Contents of a file, which may be those of a training.
@@ -514,6 +519,29 @@ pub enum NetworkSource {
 }
 
 impl NetworkSource {
+    /// The best network of `run`.
+    pub fn of(run: &RunView) -> Self {
+        match &run.kept {
+            Some((name, file)) => Self::Kept(name.clone(), Arc::clone(file)),
+            None => Self::Training(run.id, Box::new(run.setup.clone())),
+        }
+    }
+
+    /// The task of decoding another file into a table next to it.
+    pub fn decode(&self) -> FileTask {
+        let task = self.task((DECODED, "readings"), |file, _| {
+            Box::new(move |path| decoded(&file, path))
+        });
+        let Purpose::Save(contents) = task.purpose else {
+            return task;
+        };
+        FileTask {
+            suggestion: String::new(),
+            purpose: Purpose::Decode(contents),
+            ..task
+        }
+    }
+
     /// Returns the decoders that can be exported.
     pub fn decoders(&self) -> impl Iterator<Item = BundleDecoder> {
         let has_network = !matches!(self, Self::Samples(..));
@@ -625,6 +653,27 @@ impl NetworkSource {
             })
         })
     }
+}
+
+/// A file of readings for a network.
+const DECODED: FileWords = FileWords {
+    kind: "readings",
+    description: "Decodes all rows of another file with the columns of the readings; a CSV file next to it gets the targets, with \
+                  the times and groups of the file and the half-widths of the 90 % intervals.",
+    extensions: &["csv", "txt", "tsv", "npy", "npz", "mat", "xlsx"],
+};
+
+/// Decodes the readings in a file into a table next to it, and says where and what to check.
+fn decoded(file: &NetworkFile, path: &Path) -> Result<String, String> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let to = free_path(&path.with_file_name(format!("{stem}-decoded.csv")));
+    output::begin();
+    decode_file(file, path, &to).map_err(|failure| failure.to_string())?;
+    let mut text = format!("Saved {}", to.display());
+    for warning in &output::warnings() {
+        text += &format!(". {}", capitalised(warning));
+    }
+    Ok(text)
 }
 
 /// Draws or reads the samples of a setup.

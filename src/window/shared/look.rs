@@ -5,19 +5,17 @@ use decoupler_files::{
     export::format_number,
     figure::{
         SequentialMap,
-        surface::{OrbitCamera, Quantity, Surface, ViewMode},
+        surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
     },
 };
-use eframe::egui::{
-    Align, Button, ComboBox, CursorIcon, Layout, Popup, Rect, Sense, Ui, UiBuilder, WidgetInfo, accesskit::Role, vec2,
-};
+use eframe::egui::{Align, Button, ComboBox, CursorIcon, Layout, Popup, Rect, Sense, Ui, UiBuilder, vec2};
 
 use super::Effect;
 use crate::window::{
-    surface_view::{ColourBar, SurfaceViewResponse},
+    surface_view::{SurfaceView, SurfaceViewResponse, colour_bar_ui},
     test_view::HeightScale,
-    theme::{Theme, rgb, space},
-    widgets::{dim_ui, section_heading_ui, segmented_ui},
+    theme::{rgb, space},
+    widgets::{card_ui, dim_ui, section_heading_ui, segmented_ui},
 };
 
 /// Camera, mode and colours in which all views draw surfaces.
@@ -82,8 +80,42 @@ pub fn view_mode_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
     effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
 }
 
-/// Turns all surfaces as this one was turned, and marks the node under the pointer on its neighbours too.
-pub fn follow_surface(shown: &SurfaceViewResponse, look: Look, marked: &mut Option<usize>, effects: &mut Vec<Effect>) {
+/// Cards of the same width side by side in `rect`, with the colour scales of `figure` at the right of the last one;
+/// `contents_ui` receives the number of the card.
+pub fn surface_cards_ui(
+    ui: &mut Ui,
+    (rect, cards): (Rect, usize),
+    figure: &SurfaceFigure,
+    look: Look,
+    effects: &mut Vec<Effect>,
+    mut contents_ui: impl FnMut(&mut Ui, usize, &mut Vec<Effect>),
+) {
+    let gap = space(2);
+    let (whole, scales) = rect.split_left_right_at_x(rect.right() - Surface::SCALE_WIDTH);
+    let width = (whole.width() - gap * (cards as f32 - 1.0)) / cards as f32;
+    for place in 0..cards {
+        let left = whole.left() + (width + gap) * place as f32;
+        let card = Rect::from_x_y_ranges(left..=left + width, whole.y_range());
+        card_ui(ui, card, |ui| contents_ui(ui, place, effects));
+    }
+    let (parts, note) = (figure.scales(), figure.note());
+    let part = scales.height() / parts.len().max(1) as f32;
+    for (index, scale) in parts.iter().enumerate() {
+        let top = scales.top() + part * index as f32;
+        let slot = Rect::from_x_y_ranges(scales.x_range(), top..=top + part).shrink2(vec2(0.0, space(4)));
+        colour_scale_ui(ui, slot, scale, &note, look, effects);
+    }
+}
+
+/// Shows a surface, turns all surfaces as it is turned, and marks the node under the pointer on its neighbours too.
+pub fn surface_ui(
+    ui: &mut Ui,
+    view: SurfaceView<'_>,
+    look: Look,
+    marked: &mut Option<usize>,
+    effects: &mut Vec<Effect>,
+) -> SurfaceViewResponse {
+    let shown = view.show(ui);
     if shown.camera != look.camera {
         let camera = shown.camera;
         effects.push(Effect::Look(Look { camera, ..look }));
@@ -93,6 +125,7 @@ pub fn follow_surface(shown: &SurfaceViewResponse, look: Look, marked: &mut Opti
         *marked = shown.hovered_node;
         shown.response.ctx.request_repaint();
     }
+    shown
 }
 
 /// The list of targets behind `name`, where there are several.
@@ -115,10 +148,9 @@ pub fn target_choice_ui(ui: &mut Ui, name: &str, id: &str, targets: &[Channel], 
 
 /// The colour scale in `slot`. A click opens its options: the colour map, and whether the scale is locked. `note` is shown
 /// under the pointer.
-pub fn colour_scale_ui(ui: &mut Ui, slot: Rect, scale: &Surface, note: &str, look: Look, effects: &mut Vec<Effect>) {
+fn colour_scale_ui(ui: &mut Ui, slot: Rect, scale: &Surface, note: &str, look: Look, effects: &mut Vec<Effect>) {
     let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
-    let theme = Theme::of(ui);
-    let bar = ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
+    let bar = colour_bar_ui(&mut slot_ui, scale, slot.height());
     let mut changed = look;
     Popup::menu(&bar).show(|ui| {
         // A menu justifies its lines.
@@ -172,39 +204,37 @@ fn colours_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
     }
 }
 
-/// The choice between a locked and a free scale, where there is one; changes `look`.
+/// The check box that locks the scale, where there is one; changes `look`.
 fn lock_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
     let limit_mm = *scale.range.end();
-    let keeps = format!("Keeps ± {} mm for whatever is shown next.", format_number(limit_mm));
-    let meanings = match scale.quantity {
-        Quantity::Height => [
-            "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.",
-            "Spans the displayed heights: small differences are visible, but colours are not comparable between plots.",
-        ],
-        Quantity::Target(_) => [
-            "Spans the values of all test samples: colours mean the same for every sample.",
-            "Spans the displayed values: small differences are visible, but colours are not comparable between plots.",
-        ],
-        Quantity::Error => [&*keeps, "Spans ± the largest displayed error."],
+    let hint = match scale.quantity {
+        Quantity::Height => {
+            "Locked, it spans the whole stroke, from full compression to rest: colours mean the same on every surface. \
+             Free, it spans the displayed heights."
+        }
+        Quantity::Target(_) => {
+            "Locked, it spans the values of all test samples: colours mean the same for every sample. Free, it spans the \
+             displayed values."
+        }
+        Quantity::Error => &format!(
+            "Locked, it keeps ± {} mm for whatever is shown next. Free, it spans ± the largest displayed error.",
+            format_number(limit_mm)
+        ),
         // The limit of errors is in millimetres, which these are not.
         Quantity::Pattern | Quantity::Sensitivity | Quantity::TargetError(_) => return,
     };
-    let is_locked = match scale.quantity {
-        Quantity::Error => look.error_limit_mm.is_some(),
-        _ => look.heights == HeightScale::Stroke,
+    let is_error = scale.quantity == Quantity::Error;
+    let mut is_locked = match is_error {
+        true => look.error_limit_mm.is_some(),
+        false => look.heights == HeightScale::Stroke,
     };
     section_heading_ui(ui, "Scale");
-    for ((locks, text), meaning) in [(true, "Locked"), (false, "Free")].into_iter().zip(meanings) {
-        let button = Button::selectable(locks == is_locked, text).min_size(vec2(space(24), space(6)));
-        let button = ui.add(button);
-        button.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, locks == is_locked, text));
-        if button.clicked() {
-            match (&scale.quantity, locks) {
-                (Quantity::Error, _) => look.error_limit_mm = locks.then_some(limit_mm),
-                (_, true) => look.heights = HeightScale::Stroke,
-                (_, false) => look.heights = HeightScale::Fitted,
-            }
+    if ui.checkbox(&mut is_locked, "Locked").changed() {
+        match (is_error, is_locked) {
+            (true, _) => look.error_limit_mm = is_locked.then_some(limit_mm),
+            (false, true) => look.heights = HeightScale::Stroke,
+            (false, false) => look.heights = HeightScale::Fitted,
         }
-        dim_ui(ui, meaning);
     }
+    dim_ui(ui, hint);
 }

@@ -12,17 +12,17 @@ mod run_view;
 mod state;
 mod view;
 
-pub use super::training_worker::{RunResult, RunView};
+pub use super::training_worker::{OpenPlan, RunResult, RunView};
 pub use command::{About, Command, Offer, Offers};
 pub use effect::{Effect, Matter, Notice};
-pub use error_table::error_table_ui;
+pub use error_table::{error_table_ui, targets_table_ui};
 pub use export::{
     ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, ToCopy, file_stem,
     saying_saved,
 };
-pub use look::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
+pub use look::{Look, RightCard, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui};
 pub use offers::{FileInUse, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsRequest, RunsWorker};
 pub use run_view::{run_buttons_ui, sentence, training_status};
-pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
-pub use view::{Columns, Holdings, MIN_WIDTH_FOR_REPORT, Status, Tone, Unfinished, View, ViewKind};
+pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_settings};
+pub use view::{Holdings, Status, Tone, Unfinished, View, ViewKind};

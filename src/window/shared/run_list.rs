@@ -29,7 +29,7 @@ const LONGEST_WRITE: Duration = Duration::from_secs(5);
 const THREAD: &str = "run list";
 
 /// Requests to the thread.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum RunsRequest {
     /// Keep the runs in this folder.
     Open(PathBuf),

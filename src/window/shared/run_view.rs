@@ -1,33 +1,27 @@
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 use decoupler_core::{evaluation::TestErrors, text::capitalised, training::StopReason};
-use decoupler_files::{
-    export::{format_duration, format_number, format_percent},
-    import::Progress as Reading,
-};
-use eframe::egui::{Key, Ui, WidgetInfo, accesskit::Role};
+use decoupler_files::export::{format_duration, format_percent};
+use eframe::egui::{Ui, WidgetInfo, accesskit::Role};
 
-use super::{Effect, Phase, RecordingDraft, RunView, Shared, SourceKind, Status, Tone};
-use crate::window::{
-    theme::space,
-    widgets::{ghost_button, primary_button, with_shortcut},
-};
+use super::{Command, Effect, Phase, RunView, Shared, SourceKind, Status, Tone};
+use crate::window::widgets::{ghost_button, primary_button};
 
-impl RunView {
-    /// Shares the plan of `draft`, if that is the same.
-    pub fn share_plan(&mut self, draft: &RecordingDraft) {
-        if let (Ok(plan), true) = (&draft.plan, draft.is_plan(self.plan.as_ref())) {
-            self.plan = Some(Arc::clone(plan));
-        }
-    }
-}
-
-/// The buttons that run a training, from right to left.
+/// The buttons that run a training.
 pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     let phase = shared.phase;
     // In a narrow window the buttons show only their symbols.
-    let is_short = ui.available_width() < space(120);
-    let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, hint: String, effect: Effect| {
+    let is_short = ui.ctx().content_rect().width() < 1100.0;
+    let longer = Command::TrainLonger.about();
+    if shared.can_continue() && ui.add(ghost_button(&longer.name)).on_hover_text(longer.hint).clicked() {
+        effects.push(Effect::Continue);
+    }
+    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
+    let hint = Command::Train.about().tooltip(ui.ctx());
+    if train.on_hover_text(hint).clicked() {
+        effects.push(Effect::Train);
+    }
+    let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, command: Command, effect: Effect| {
         let shown = if is_short {
             text.split(' ').next().unwrap_or(text)
         } else {
@@ -35,37 +29,17 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         };
         let button = ui.add_enabled(is_possible, ghost_button(shown));
         button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, text));
-        if button.on_hover_text(hint).clicked() {
+        if button.on_hover_text(command.about().tooltip(ui.ctx())).clicked() {
             effects.push(effect);
         }
     };
-    let hint = with_shortcut(ui, "Ends the training; the best network so far is kept", Key::Period);
-    button_ui(ui, "■ Stop", phase.is_busy(), hint, Effect::Stop);
-    let (text, effect) = match phase {
-        Phase::Paused => ("▶ Resume", Effect::Resume),
-        _ => ("⏸ Pause", Effect::Pause),
+    let (text, command, effect) = match phase {
+        Phase::Paused => ("▶ Resume", Command::ResumeTraining, Effect::Resume),
+        _ => ("⏸ Pause", Command::PauseTraining, Effect::Pause),
     };
-    let hint = with_shortcut(ui, "Pauses or resumes the training", Key::P);
     let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-    button_ui(ui, text, can_pause, hint, effect);
-    let can_train_longer = shared.can_continue();
-    let hint = match (can_train_longer, shared.source) {
-        (false, SourceKind::Array) => "Draws the sets and trains the network",
-        (true, SourceKind::Array) => "Starts again: draws the sets and trains the network",
-        (false, SourceKind::Recording) => "Reads the recording and trains the network",
-        (true, SourceKind::Recording) => "Starts again: reads the recording and trains the network",
-    };
-    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
-    if train.on_hover_text(with_shortcut(ui, hint, Key::Enter)).clicked() {
-        effects.push(Effect::Train);
-    }
-    if can_train_longer {
-        let hint = "Continues from the current weights with the method and the epochs on the left, counted from here. \
-                    Train starts again from random weights.";
-        if ui.add(ghost_button("Train longer")).on_hover_text(hint).clicked() {
-            effects.push(Effect::Continue);
-        }
-    }
+    button_ui(ui, text, can_pause, command, effect);
+    button_ui(ui, "■ Stop", phase.is_busy(), Command::StopTraining, Effect::Stop);
 }
 
 /// Returns the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of
@@ -73,11 +47,8 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
 pub fn training_status(shared: &Shared) -> Status {
     let mut status = phase_in_words(shared);
     if let (Phase::Preparing, SourceKind::Recording) = (shared.phase, shared.source) {
-        if let Some(choosing) = &shared.choosing {
-            status.progress = Some(("Choosing settings", choosing.share as f32));
-        } else if let Some(Reading { bytes, of: Some(of) }) = shared.reading {
-            status.progress = Some(("Reading", bytes as f32 / of.max(1) as f32));
-        }
+        let preparing = shared.preparing.as_ref();
+        status.progress = preparing.and_then(|preparing| Some((preparing.work, preparing.share?)));
         return status;
     }
     let running = shared.run.as_ref().filter(|_| shared.phase.is_busy());
@@ -96,12 +67,17 @@ pub fn training_status(shared: &Shared) -> Status {
 /// Returns the phase as text.
 fn phase_in_words(shared: &Shared) -> Status {
     let is_recording = shared.source == SourceKind::Recording;
-    let (tone, text) = match shared.phase {
+    let phase = match shared.phase {
+        // A result that is not shown any more is no state of what is.
+        Phase::Ended(_) if shared.shown_run().is_none() => Phase::Idle,
+        phase => phase,
+    };
+    let (tone, text) = match phase {
         Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
         Phase::Idle => (Tone::Calm, "Ready: press Train"),
         Phase::Preparing if is_recording => {
-            let choosing = shared.choosing.as_ref().map(|choosing| choosing.text.as_str());
-            (Tone::Busy, choosing.unwrap_or("Reading the recording"))
+            let preparing = shared.preparing.as_ref().map(|preparing| preparing.text.as_str());
+            (Tone::Busy, preparing.unwrap_or("Reading the recording"))
         }
         Phase::Preparing => (Tone::Busy, "Drawing samples"),
         Phase::Training => (Tone::Busy, "Training"),
@@ -124,7 +100,7 @@ fn phase_in_words(shared: &Shared) -> Status {
 }
 
 fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
-    let (Some(latest), Some(result)) = (run.latest(), &run.result) else {
+    let Some(result) = &run.result else {
         return Vec::new();
     };
     let (epochs, epochs_run) = (run.settings().training.stopping.epochs, result.epochs_run);
@@ -134,12 +110,6 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
             TestErrors::Nodes(_) => format!("z error {}", format_percent(result.errors.percent())),
             TestErrors::Targets(_) => format!("error {} of range", format_percent(result.errors.percent())),
         },
-        format!("mse {}", format_number(latest.training_mse)),
-        format!(
-            "{} {}",
-            run.settings().training.method.parameter_name(),
-            format_number(latest.parameter)
-        ),
     ];
     if run.settings().starts > 1 && phase.is_busy() {
         parts.push(format!(

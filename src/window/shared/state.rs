@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use decoupler_core::{
     dataset::Simulation,
-    evaluation::{Baselines, RunSettings, auto::AutoProgress},
-    scene::{Indenter, Loading, RowModel, Scene},
+    evaluation::{Baselines, RunSettings},
+    scene::{Indenter, Loading, Noise, RowModel, Scene},
     training::{StopReason, TrainingSettings},
 };
 use decoupler_files::{
@@ -11,12 +11,15 @@ use decoupler_files::{
         SequentialMap,
         surface::{OrbitCamera, ViewMode},
     },
-    import::{Plan, Progress, Setup},
+    import::{Plan, Setup},
 };
 use serde::{Deserialize, Serialize};
 
 use super::{Look, RunList, RunResult, RunView, ViewKind};
-use crate::window::test_view::{HeightScale, RecordedTest, TestView};
+use crate::window::{
+    test_view::{HeightScale, Skin, TestView},
+    training_worker::{Asked, OpenPlan, Preparing},
+};
 
 /// State that all views read.
 #[derive(Debug)]
@@ -31,10 +34,8 @@ pub struct Shared {
     pub phase: Phase,
     /// Facts about the draft before it is trained.
     pub preview: Option<Preview>,
-    /// Progress of reading a recording before a training.
-    pub reading: Option<Progress>,
-    /// Progress of choosing the settings of a training.
-    pub choosing: Option<AutoProgress>,
+    /// Progress of reading a recording or of choosing settings before a training.
+    pub preparing: Option<Preparing>,
     /// The current or last training.
     pub run: Option<RunView>,
     /// The run list.
@@ -59,14 +60,14 @@ pub enum SourceKind {
 }
 
 /// Settings of a training on a recording, and the plan that reads it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RecordingDraft {
     /// Settings; their source is measured.
     pub settings: RunSettings,
     /// True if they are chosen by cross-validation before the training, with a memory.
     pub is_auto: bool,
     /// Plan of the import with absolute paths, or what is missing and what to do.
-    pub plan: Result<Arc<Plan>, String>,
+    pub plan: Result<OpenPlan, String>,
 }
 
 impl RecordingDraft {
@@ -76,22 +77,6 @@ impl RecordingDraft {
     /// Returns true if the settings of the next training are chosen automatically, which needs one network for all row-wires.
     pub fn is_automatic(&self) -> bool {
         self.is_auto && self.settings.source.row_model() == RowModel::Shared
-    }
-
-    /// Returns true if this is its plan. A plan that was not changed is not compared.
-    pub fn is_plan(&self, other: Option<&Arc<Plan>>) -> bool {
-        match (self.plan.as_ref().ok(), other) {
-            (Some(plan), Some(other)) => Arc::ptr_eq(plan, other) || plan == other,
-            (plan, other) => plan.is_none() && other.is_none(),
-        }
-    }
-}
-
-impl PartialEq for RecordingDraft {
-    fn eq(&self, other: &Self) -> bool {
-        (self.settings, self.is_auto, self.plan.as_ref().err())
-            == (other.settings, other.is_auto, other.plan.as_ref().err())
-            && self.is_plan(other.plan.as_ref().ok())
     }
 }
 
@@ -152,8 +137,7 @@ impl Shared {
             recording: RecordingDraft::default(),
             phase: Phase::Idle,
             preview: None,
-            reading: None,
-            choosing: None,
+            preparing: None,
             run: None,
             runs: RunList::default(),
             look: Look {
@@ -167,6 +151,16 @@ impl Shared {
             shown: ViewKind::default(),
             working: Vec::new(),
         }
+    }
+
+    /// Returns true if the displayed view has a column on the right in a window of this width in points, which leaves the
+    /// middle enough room: two surfaces, or the values of a recording over time.
+    pub fn has_report(&self, window_width: f32) -> bool {
+        let min_width = match self.source {
+            SourceKind::Array => 1700.0,
+            SourceKind::Recording => 1400.0,
+        };
+        self.shown == ViewKind::Train && window_width >= min_width
     }
 
     /// Settings of the next training.
@@ -183,8 +177,8 @@ impl Shared {
     /// Returns the current training if its settings were chosen automatically for what the next one would be chosen for.
     pub fn chosen_run(&self) -> Option<&RunView> {
         let run = self.shown_run().filter(|run| run.search.is_some())?;
-        let is_setup = self.recording.settings == *run.asked.settings() && self.recording.is_plan(run.plan.as_ref());
-        (self.recording.is_automatic() && is_setup).then_some(run)
+        let is_asked = || self.asked().is_ok_and(|asked| asked == run.asked);
+        (self.recording.is_automatic() && is_asked()).then_some(run)
     }
 
     /// Sets the training settings of the next training.
@@ -200,35 +194,46 @@ impl Shared {
     /// # Errors
     /// If something is missing; the message says what to do.
     pub fn setup(&self) -> Result<Setup, String> {
-        match self.source {
-            SourceKind::Array => Ok(self.draft.into()),
-            SourceKind::Recording => {
-                let plan = self.recording.plan.clone()?;
-                Ok(Setup::recording(self.recording.settings, Plan::clone(&plan)))
-            }
-        }
+        self.asked().map(|Asked { settings, plan }| match plan {
+            None => settings.into(),
+            Some(plan) => Setup::recording(settings, Plan::clone(&plan)),
+        })
     }
 
-    /// Returns the nodes of the current test set: the training's, or the draft's if it has another one; none for a recording.
+    /// Returns what the next training is asked for; its plan is shared, not copied.
+    ///
+    /// # Errors
+    /// If something is missing; the message says what to do.
+    pub fn asked(&self) -> Result<Asked, String> {
+        let (settings, plan) = match self.source {
+            SourceKind::Array => (self.draft, None),
+            SourceKind::Recording => (self.recording.settings, Some(self.recording.plan.clone()?)),
+        };
+        Ok(Asked { settings, plan })
+    }
+
+    /// Returns the current test set: the training's, or the draft's if it has another one.
     pub fn test(&self) -> Option<&TestView> {
         match &self.preview {
             Some(preview) if self.source == SourceKind::Array => Some(&preview.test),
-            _ => self.shown_run().and_then(|run| run.test.array()),
+            _ => self.shown_run().map(|run| &run.test),
         }
     }
 
-    /// Returns the displayed test samples of a recording.
-    pub fn recorded_test(&self) -> Option<&RecordedTest> {
-        self.shown_run().and_then(|run| run.test.recording())
+    /// Returns the array of the current test set; none for a recording.
+    pub fn skin(&self) -> Option<&Arc<Skin>> {
+        self.test()?.skin.as_ref()
     }
 
-    /// Returns the current training; none if it has the other source, or the draft has another test set by now.
+    /// Returns the current training; none if it has another source, or the draft has another test set by now.
     pub fn shown_run(&self) -> Option<&RunView> {
         let run = self.run.as_ref()?;
-        let is_recording = run.setup.plan().is_some();
-        let is_shown = match self.source {
-            SourceKind::Array => !is_recording && self.preview.is_none(),
-            SourceKind::Recording => is_recording,
+        let is_shown = match (self.source, run.setup.plan(), &self.recording.plan) {
+            (SourceKind::Array, None, _) => self.preview.is_none(),
+            // Another recording does not inherit its errors.
+            (SourceKind::Recording, Some(plan), Ok(open)) => plan.import.data == open.import.data,
+            (SourceKind::Recording, Some(_), Err(_)) => true,
+            _ => false,
         };
         is_shown.then_some(run)
     }
@@ -242,34 +247,24 @@ impl Shared {
     /// Returns true if the current training can continue from its present weights with the draft: its sets and networks
     /// must be the same. A paused training is resumed instead, unless the method or the stopping rules change.
     pub fn can_continue(&self) -> bool {
-        let Some(run) = self.shown_run() else { return false };
-        let asked = run.asked.settings();
+        // The worker does not have a run of the list.
+        let run = self.shown_run().filter(|run| run.kept.is_none());
+        let (Some(run), Ok(mut asked)) = (run, self.asked()) else {
+            return false;
+        };
+        let training = run.asked.settings.training;
         let may_continue = match self.phase {
-            Phase::Paused => self.chosen_run().is_none() && self.settings().training != asked.training,
+            Phase::Paused => self.chosen_run().is_none() && asked.settings.training != training,
             Phase::Ended(reason) => reason != StopReason::Diverged,
             _ => false,
         };
-        let settings = match self.source {
-            SourceKind::Array => self.draft,
-            SourceKind::Recording => self.recording.settings,
-        };
-        let training = asked.training;
-        may_continue
-            && RunSettings { training, ..settings } == *asked
-            && (self.source == SourceKind::Array || self.recording.is_plan(run.plan.as_ref()))
+        asked.settings.training = training;
+        may_continue && asked == run.asked
     }
 
-    /// Returns true if the settings or the plan have changed since `run` began or was continued. Plans are compared only if
-    /// they are not the same one.
-    pub fn has_changed_since(&self, run: &RunView) -> bool {
-        let asked = run.asked.settings();
-        match self.source {
-            SourceKind::Array => self.draft != *asked,
-            SourceKind::Recording => {
-                let RecordingDraft { settings, plan, .. } = &self.recording;
-                plan.is_ok() && (settings != asked || !self.recording.is_plan(run.plan.as_ref()))
-            }
-        }
+    /// Returns true if the settings or the plan have changed since `run` began or was continued, and it has ended.
+    pub fn is_old(&self, run: &RunView) -> bool {
+        run.stop_reason.is_some() && self.asked().is_ok_and(|asked| asked != run.asked)
     }
 
     /// The current result.
@@ -279,18 +274,14 @@ impl Shared {
 }
 
 /// Settings with which the window opens for the first time: the paper's experiment, but with a ball pressed somewhere
-/// onto the surface, which is easily recognised as touch, instead of independently pressed nodes.
+/// onto the surface, which is easily recognised as touch, instead of independently pressed nodes, and readings with noise.
 pub fn opening_settings() -> RunSettings {
     RunSettings::from(Simulation {
-        scene: opening_scene(),
+        scene: Scene {
+            loading: Loading::Indenter(Indenter::default()),
+            noise: Noise::relative(1e-3),
+            ..Scene::default()
+        },
         ..Simulation::default()
     })
-}
-
-/// The scene with which the window opens for the first time.
-pub fn opening_scene() -> Scene {
-    Scene {
-        loading: Loading::Indenter(Indenter::default()),
-        ..Scene::default()
-    }
 }

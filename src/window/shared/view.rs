@@ -2,12 +2,12 @@
 
 use std::fmt::Debug;
 
-use eframe::egui::{Key, RichText, Ui};
+use eframe::egui::{Align, Key, Label, Layout, RichText, Sense, TextStyle, TextWrapMode, Ui, Vec2, WidgetText};
 
 use super::{Effect, FileInUse, Offers, Shared, Shown};
 use crate::window::{
     theme::{Theme, space, type_size},
-    widgets::{state_ui, status_progress_ui},
+    widgets::progress_bar_ui,
 };
 
 /// One of the views. It owns its private state and the handles of its threads, reads the shared state, and requests
@@ -30,13 +30,13 @@ pub trait View: Debug {
         Vec::new()
     }
 
-    /// Shows its tools at the right of the top bar, from right to left.
+    /// Shows its tools at the right of the top bar.
     fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Shows its column on the left.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
-    /// Shows its column on the right, where [`ViewKind::columns`] has one.
+    /// Shows its column on the right, where [`Shared::has_report`] is true.
     fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Shows its middle. Returns the status line at the bottom, or `None` for that of the training.
@@ -79,27 +79,6 @@ impl ViewKind {
         const KEYS: [Key; 5] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5];
         KEYS[self as usize]
     }
-
-    /// Returns its columns in a window of this width in points.
-    pub fn columns(self, window_width: f32) -> Columns {
-        let is_narrow = window_width < MIN_WIDTH_FOR_REPORT;
-        Columns {
-            form_width: space(if self == Self::Train && is_narrow { 62 } else { 68 }),
-            has_report: self == Self::Train && !is_narrow,
-        }
-    }
-}
-
-/// Width of a window, in points, from which a column on the right leaves the middle enough room.
-pub const MIN_WIDTH_FOR_REPORT: f32 = 1400.0;
-
-/// The columns next to the middle of a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Columns {
-    /// Width of the one on the left, in points.
-    pub form_width: f32,
-    /// True if there is a column on the right.
-    pub has_report: bool,
 }
 
 /// Status of a view, shown in the line at the bottom.
@@ -144,12 +123,25 @@ impl Status {
             Tone::Bad => palette.bad,
         };
         ui.horizontal_centered(|ui| {
-            state_ui(ui, colour, &self.text);
+            ui.spacing_mut().item_spacing.x = space(4);
+            let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
+            ui.painter().circle_filled(dot.center(), 4.0, colour);
+            let text = |text: &str| RichText::new(text).size(type_size().note);
+            ui.add(Label::new(text(&self.text)).truncate());
+            let for_progress = self.progress.map_or(0.0, |_| space(44));
             for note in &self.notes {
-                ui.label(RichText::new(note).size(type_size().note).color(palette.dim));
+                let note = text(note).color(palette.dim);
+                let note = WidgetText::from(note).into_galley(ui, Some(TextWrapMode::Extend), 0.0, TextStyle::Body);
+                // What does not fit is left out, not cut.
+                if note.size().x < ui.available_width() - for_progress {
+                    ui.label(note);
+                }
             }
             if let Some((name, share)) = self.progress {
-                status_progress_ui(ui, name, share);
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    ui.set_max_width(space(40).min(ui.available_width()));
+                    progress_bar_ui(ui, name, share, &format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0)));
+                });
             }
         });
     }

@@ -28,25 +28,15 @@ pub struct Theme {
 }
 
 impl Theme {
-    /// Returns the dark theme.
-    pub fn dark() -> &'static Self {
-        static DARK: OnceLock<Theme> = OnceLock::new();
-        DARK.get_or_init(|| Self::new(true))
-    }
-
-    /// Returns the light theme.
-    pub fn light() -> &'static Self {
-        static LIGHT: OnceLock<Theme> = OnceLock::new();
-        LIGHT.get_or_init(|| Self::new(false))
+    /// Returns the dark or the light theme.
+    pub fn get(is_dark: bool) -> &'static Self {
+        static THEMES: OnceLock<[Theme; 2]> = OnceLock::new();
+        &THEMES.get_or_init(|| [false, true].map(Theme::new))[usize::from(is_dark)]
     }
 
     /// Returns the theme of `ui`.
     pub fn of(ui: &eframe::egui::Ui) -> &'static Self {
-        if ui.visuals().dark_mode {
-            Self::dark()
-        } else {
-            Self::light()
-        }
+        Self::get(ui.visuals().dark_mode)
     }
 
     fn new(is_dark: bool) -> Self {

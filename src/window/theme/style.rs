@@ -60,6 +60,8 @@ fn style(is_dark: bool) -> Style {
     spacing.scroll = ScrollStyle {
         bar_width: space(2),
         floating_width: 3.0,
+        // One sees that there is more, also before the pointer is there.
+        dormant_handle_opacity: 0.3,
         ..ScrollStyle::floating()
     };
     style.interaction.tooltip_delay = 0.3;

@@ -1,6 +1,7 @@
 use decoupler_core::{
-    dataset::{Dataset, SplitBy},
-    evaluation::{Intervals, Run, RunError},
+    dataset::{Dataset, Folds, SplitBy, Stream},
+    decoupling::Combined,
+    evaluation::{CrossValidated, DecoderSet, Intervals, Run, RunError},
     job::Job,
     training::StopReason,
 };
@@ -25,6 +26,31 @@ impl Calibration {
             by,
             chosen: sets.chosen_intervals(),
         })
+    }
+
+    /// Fits ridge regression, to answer in place of the network of `run`, and calibrates its intervals.
+    ///
+    /// # Errors
+    /// If it cannot be fitted.
+    pub fn ridge(&self, run: &Run) -> Result<(Combined, Result<Intervals, RunError>), RunError> {
+        let (mut settings, training) = (*run.settings(), &self.training);
+        let decoder = DecoderSet::new(settings, training.clone(), None).linear()?;
+        let program = decoder.program().expect("an affine map is a program");
+        let targets = training.outputs();
+        let combined = Combined {
+            network: vec![0.0; targets],
+            others: vec![(program, vec![1.0; targets])],
+            margin: (20.0 / training.samples() as f64).max(0.1),
+        };
+        // Networks are trained with it, and not used.
+        (settings.hidden, settings.starts, settings.training.stopping.epochs) = (1, 1, 1);
+        let count = self.by.folds_of(training, Intervals::FOLDS);
+        let folds = Folds::by(training, count, self.by, &mut settings.seed.rng(Stream::Split));
+        let validated = folds.map_err(RunError::from);
+        let validated =
+            validated.and_then(|folds| CrossValidated::on_folds(&settings, training, folds, &Job::UNINTERRUPTED));
+        let calibrate = |of: CrossValidated| Intervals::calibrate(training, of.linear.view(), self.by).checked();
+        Ok((combined, validated.and_then(calibrate)))
     }
 
     /// Forgets the choice of settings, because the training continues with others.

@@ -10,14 +10,14 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{Coverage, Run, RunError, RunSettings, StartRecord, TestErrors, auto::AutoProgress},
+    evaluation::{Coverage, Intervals, Run, RunError, RunSettings, StartRecord, TestErrors},
     live::{DriftReference, LiveError},
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::{Progress as Reading, Recorded, Setup},
+    import::{Recorded, Setup},
 };
 use ndarray::Array2;
 
@@ -27,7 +27,8 @@ use super::{
 };
 use crate::window::{
     job::{Background, JobError, Wake},
-    test_view::TargetCharts,
+    test_view::TestCharts,
+    timeline::Timeline,
 };
 
 /// Request from the window to the worker.
@@ -42,6 +43,8 @@ pub enum Request {
     Resume,
     /// End the training and keep its network.
     Stop,
+    /// Answer with ridge regression in place of the network of the ended training.
+    UseRidge,
     /// Inspect this training, unless another one has replaced it.
     Inspect(RunId, Inspection),
     /// Keep checkpoints of running trainings in this folder from now on, saved at this interval.
@@ -89,16 +92,25 @@ pub enum Event {
     Unkept(String),
     /// The training continues with these settings, or an error.
     Continued(Result<Box<RunSettings>, String>),
-    /// Progress of reading a recording before a training.
-    Reading(Reading),
-    /// Progress of choosing the settings of a training.
-    Choosing(Box<AutoProgress>),
+    /// Progress of reading a recording or of choosing settings before a training.
+    Preparing(Preparing),
     /// Progress of the training.
     Progressed(Box<Progress>),
     /// The current training has ended: the network file to keep, or the reason why there is none.
     Finished(Result<Box<NetworkFile>, String>),
     /// The thread has ended, with the reason unless it was asked to end.
     Died(Option<JobError>),
+}
+
+/// Progress of the work before a training.
+#[derive(Clone, Debug)]
+pub struct Preparing {
+    /// Name of the work.
+    pub work: &'static str,
+    /// The work in a few words.
+    pub text: String,
+    /// Share that is done, if known.
+    pub share: Option<f32>,
 }
 
 /// Function called on the thread of the worker with a training, or with the reason why it is not available.
@@ -110,6 +122,8 @@ pub struct TrainedRun {
     pub run: Run,
     /// Origin of recorded samples; `None` for a simulated array.
     pub recorded: Option<Recorded>,
+    /// Places of the test samples of a recording on an axis of time.
+    pub timeline: Option<Arc<Timeline>>,
     /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
     pub drift: Result<DriftReference, LiveError>,
     /// Remarks on the samples of a recording.
@@ -170,8 +184,8 @@ pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
 pub struct RunResult {
     /// Decoded values of the test set: samples × targets, in their units.
     pub answers: Arc<Array2<f64>>,
-    /// Charts of all test samples of a recording.
-    pub charts: Option<Arc<TargetCharts>>,
+    /// Charts of all test samples.
+    pub charts: Arc<TestCharts>,
     /// Remarks on the errors of a recording, when the training is paused or has ended.
     pub remarks: Vec<String>,
     /// Errors of the decoded values.
@@ -180,6 +194,8 @@ pub struct RunResult {
     pub network_alone: Option<TestErrors>,
     /// Coverage of the intervals on the test set, if they were calibrated.
     pub coverage: Vec<Option<Coverage>>,
+    /// Intervals of the decoded values, if they were calibrated.
+    pub intervals: Option<Intervals>,
     /// Epoch of the network.
     pub best_epoch: usize,
     /// Problem of the training, when it has ended.
@@ -237,14 +253,8 @@ pub struct Worker {
     keeping: Keeping,
     /// The training that is being prepared.
     awaited: Cell<Option<RunId>>,
-    watched: Arc<Watched>,
-}
-
-/// Message of the window to the worker during its work.
-#[derive(Debug, Default)]
-pub(super) struct Watched {
     /// Number of the training last asked for: the preparations of others are cancelled.
-    pub(super) newest: AtomicU64,
+    newest: Arc<AtomicU64>,
 }
 
 impl Worker {
@@ -252,8 +262,8 @@ impl Worker {
     pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
         let mut job = Background::new("training", wake);
-        let (watched, keeping) = (Arc::<Watched>::default(), Keeping::default());
-        let (in_thread, keeps) = (Arc::clone(&watched), keeping.clone());
+        let (newest, keeping) = (Arc::<AtomicU64>::default(), Keeping::default());
+        let (in_thread, keeps) = (Arc::clone(&newest), keeping.clone());
         job.start(
             move |report| TrainingLoop::new(report, &in_thread, keeps).run(&incoming),
             |ended| Event::Died(ended.err()),
@@ -263,7 +273,7 @@ impl Worker {
             job,
             keeping,
             awaited: Cell::default(),
-            watched,
+            newest,
         }
     }
 
@@ -308,7 +318,7 @@ impl Worker {
     pub fn begin(&self, origin: Origin) {
         let id = RunId::new();
         self.awaited.set(Some(id));
-        self.watched.newest.store(id.0, Ordering::Relaxed);
+        self.newest.store(id.0, Ordering::Relaxed);
         self.ask(Request::Begin(id, origin));
     }
 
@@ -316,7 +326,7 @@ impl Worker {
     /// [`Self::next_event`] reports it.
     pub fn ask(&self, request: Request) {
         if matches!(request, Request::Stop) && self.awaited.take().is_some() {
-            self.watched.newest.store(RunId::new().0, Ordering::Relaxed);
+            self.newest.store(RunId::new().0, Ordering::Relaxed);
         }
         // The receiver is dropped only if the worker died.
         let _ = self.requests().send(request);

@@ -8,7 +8,7 @@ mod past_networks;
 mod run_view;
 mod training_loop;
 
-pub use message::{Event, Origin, Progress, Request, RunId, RunResult, Start, TrainedRun, Worker};
+pub use message::{Event, Origin, Preparing, Progress, Request, RunId, RunResult, Start, TrainedRun, Worker};
 pub use past_networks::PastNetworks;
-pub use run_view::RunView;
+pub use run_view::{Asked, OpenPlan, RunView};
 pub use training_loop::LOST;

@@ -3,7 +3,7 @@ use std::{
     path::Path,
     sync::{
         Arc,
-        atomic::Ordering,
+        atomic::{AtomicU64, Ordering},
         mpsc::{Receiver, TryRecvError},
     },
     time::{Duration, Instant},
@@ -14,16 +14,12 @@ use decoupler_core::{
         Intervals, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
         frame_us,
-        recorded::Determination,
     },
     job::Job,
     training::TrainingSettings,
 };
 use decoupler_files::{
-    export::{
-        CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
-        describe_worse_than_ridge,
-    },
+    export::{CheckpointFile, CheckpointPlace, NetworkFile, describe_samples},
     import::{ChoosingProgress, Progress as Reading, Setup, SetupSets},
     machine::system_cause,
 };
@@ -33,12 +29,14 @@ use super::{
     Event, Origin, Progress, Request, RunId, RunResult, RunView, Start, TrainedRun,
     calibration::Calibration,
     keeping::{Keeping, question},
-    message::{Watched, continue_run, furthest_epoch},
+    message::{Preparing, continue_run, furthest_epoch},
     past_networks::PastNetworks,
+    run_view::describe,
 };
 use crate::window::{
     job::Report,
-    test_view::{TestSet, TestViewError},
+    test_view::{TestView, TestViewError},
+    timeline::Timeline,
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
@@ -48,7 +46,8 @@ const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 /// State of the thread.
 pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
-    watched: &'a Watched,
+    /// Number of the training last asked for.
+    newest: &'a AtomicU64,
     keeping: Keeping,
     /// Checkpoints of trainings that were cut short; the last is offered first.
     left: Vec<CheckpointPlace>,
@@ -60,7 +59,7 @@ struct Training {
     id: RunId,
     trained: TrainedRun,
     /// Its test set, ready to be drawn.
-    test: TestSet,
+    test: TestView,
     past: PastNetworks,
     stage: Stage,
     /// Reason why the training that has ended has no intervals.
@@ -81,10 +80,10 @@ enum Stage {
 }
 
 impl<'a> TrainingLoop<'a> {
-    pub(super) fn new(report: &'a Report<Event>, watched: &'a Watched, keeping: Keeping) -> Self {
+    pub(super) fn new(report: &'a Report<Event>, newest: &'a AtomicU64, keeping: Keeping) -> Self {
         Self {
             report,
-            watched,
+            newest,
             keeping,
             left: Vec::new(),
             current: None,
@@ -123,7 +122,11 @@ impl<'a> TrainingLoop<'a> {
                 let calibrated = current.calibrated(&|| true);
                 self.end(calibrated);
             }
-            (Request::Pause | Request::Resume | Request::Stop, _) => {}
+            (Request::UseRidge, Some(current)) if current.stage == Stage::Done => {
+                let calibrated = current.trained.use_ridge();
+                self.end(Some(calibrated));
+            }
+            (Request::Pause | Request::Resume | Request::Stop | Request::UseRidge, _) => {}
             (Request::Inspect(id, inspection), Some(current)) if current.id == id => {
                 inspection(Ok(&current.trained));
             }
@@ -206,9 +209,15 @@ impl<'a> TrainingLoop<'a> {
     /// its networks.
     fn prepare(&self, id: RunId, origin: Origin) -> Result<(TrainedRun, RunView), String> {
         let report = self.report;
-        let is_cancelled = || self.watched.newest.load(Ordering::Relaxed) != id.0 || report.is_cancelled();
+        let is_cancelled = || self.newest.load(Ordering::Relaxed) != id.0 || report.is_cancelled();
         let job = Job::new(&is_cancelled);
-        let mut on_reading = |progress: Reading| report.progress(Event::Reading(progress), |_, _| ());
+        let on_work = |work, text, share| {
+            report.progress(Event::Preparing(Preparing { work, text, share }), |_, _| ());
+        };
+        let mut on_reading = |Reading { bytes, of }: Reading| {
+            let share = of.map(|of| bytes as f32 / of.max(1) as f32);
+            on_work("Reading", "Reading the recording".to_owned(), share);
+        };
         let here = Path::new("");
         let mut asked = None;
         let mut draw = |setup: &Setup, states| -> Result<TrainedRun, TestViewError> {
@@ -222,7 +231,7 @@ impl<'a> TrainingLoop<'a> {
                 let mut on_choosing = |progress| match progress {
                     ChoosingProgress::Reading(progress) => on_reading(progress),
                     ChoosingProgress::Trying(progress) => {
-                        report.progress(Event::Choosing(Box::new(progress)), |_, _| ());
+                        on_work("Choosing settings", progress.text, Some(progress.share as f32));
                     }
                 };
                 let fixed = AutoFixed::default();
@@ -238,8 +247,7 @@ impl<'a> TrainingLoop<'a> {
                 restored(left.path(), &job, &mut on_reading)?
             }
         };
-        let began =
-            RunView::begun(id, &trained.run, trained.recorded.as_ref(), asked).map_err(|error| error.to_string())?;
+        let began = RunView::begun(id, &trained, asked).map_err(|error| error.to_string())?;
         job.check().map_err(|error| error.to_string())?;
         Ok((trained, began))
     }
@@ -376,7 +384,7 @@ impl Training {
         let answers = run.decouple_test();
         let errors = run.errors_of(&answers);
         let network_alone = run.scores().and_then(|scores| scores.network_alone);
-        let charts = self.test.recording().map(|test| Arc::new(test.charts(&answers)));
+        let charts = Arc::new(self.test.charts(&answers));
         let has_several = run.trainers().len() > 1;
         let starts = if has_several { run.starts() } else { Vec::new() };
         let cost = begun.elapsed();
@@ -404,6 +412,7 @@ impl Training {
                 errors,
                 network_alone,
                 coverage: run.coverage().to_vec(),
+                intervals: run.intervals().cloned(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),
@@ -428,20 +437,22 @@ impl Training {
         let Some(recorded) = &self.trained.recorded else {
             return Vec::new();
         };
-        let (targets, has_combined) = (&run.problem().targets, run.combined().is_some());
-        let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
         let mut remarks = self.trained.of_samples.clone();
-        remarks.extend(describe_determinacy(targets, &determined, has_combined));
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),
-                network_alone: has_combined.then(|| errors.clone()),
+                network_alone: run.combined().map(|_| errors.clone()),
                 baselines: baselines.clone(),
-                coverage: Vec::new(),
+                coverage: run.coverage().to_vec(),
             };
-            remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
+            remarks.extend(describe(
+                run.problem(),
+                run.test(),
+                answers,
+                &scores,
+                recorded.plan.division.by,
+            ));
         }
-        remarks.extend(describe_coverage(targets, run.coverage()));
         remarks.extend(self.no_intervals.clone());
         remarks
     }
@@ -464,12 +475,14 @@ fn restored(path: &Path, job: &Job<'_>, on_reading: &mut dyn FnMut(Reading)) -> 
 
 impl TrainedRun {
     fn new(run: Run, sets: &SetupSets) -> Self {
+        let recordings = sets.recordings.as_ref();
         Self {
-            run,
             recorded: sets.recorded().cloned(),
+            timeline: recordings.map(|recordings| Arc::new(Timeline::of(recordings, run.settings().seed))),
             drift: sets.drift_reference(),
             of_samples: describe_samples(sets),
             calibration: Calibration::of(sets),
+            run,
         }
     }
 
@@ -480,6 +493,18 @@ impl TrainedRun {
             drift: self.drift.clone(),
             ..file
         })
+    }
+
+    /// Answers with ridge regression in place of the network from now on; returns its intervals, or why there are none.
+    fn use_ridge(&mut self) -> Result<Intervals, String> {
+        let calibration = self.calibration.as_ref().ok_or(LOST)?;
+        let (combined, intervals) = calibration.ridge(&self.run).map_err(|error| error.to_string())?;
+        if let Some(recorded) = &mut self.recorded {
+            recorded.combined = Some(combined.clone());
+            recorded.chosen_intervals = intervals.clone().ok();
+        }
+        self.run.set_combined(Some(combined));
+        intervals.map_err(|reason| format!("no 90 % intervals: {reason}"))
     }
 
     /// Returns the current state, to be resumed later.

@@ -1,20 +1,13 @@
 //! Components that egui lacks, each accessible by its label, and the reason why text typed into a field was refused.
 
 use eframe::egui::{
-    Align, Button, CollapsingHeader, Color32, DragValue, FontId, Frame, Id, Key, KeyboardShortcut, Label, Layout,
-    Margin, Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, UiBuilder,
-    Vec2, Widget, WidgetInfo, WidgetText,
+    Align, Button, CollapsingHeader, Color32, DragValue, Frame, Id, Key, Label, Layout, Margin, ProgressBar, Rect,
+    Response, RichText, ScrollArea, Stroke, StrokeKind, TextStyle, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
     accesskit::{Invalid, Role},
     vec2,
 };
 
 use crate::window::theme::{Theme, radius, semibold, space, type_size};
-
-/// Returns the tooltip of an action with its shortcut: "Pauses the training (Ctrl+P).", with the Command key on macOS.
-pub fn with_shortcut(ui: &Ui, text: &str, key: Key) -> String {
-    let shortcut = KeyboardShortcut::new(Modifiers::COMMAND, key);
-    format!("{text} ({}).", ui.ctx().format_shortcut(&shortcut))
-}
 
 /// Heading of a section, in small capitals: "SENSOR ARRAY".
 pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {
@@ -69,8 +62,8 @@ pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
     });
 }
 
-/// Primary button, at least as large as `min_size`.
-pub fn primary_button_of(text: impl Into<String>, min_size: Vec2) -> impl Widget {
+/// Primary button.
+pub fn primary_button(text: impl Into<String>) -> impl Widget {
     let text = RichText::new(text).font(semibold(type_size().body));
     move |ui: &mut Ui| {
         let palette = Theme::of(ui).palette;
@@ -81,15 +74,10 @@ pub fn primary_button_of(text: impl Into<String>, min_size: Vec2) -> impl Widget
             widgets.active.weak_bg_fill = palette.accent_hovered;
             // On the accent colour, a ring of the same colour would be invisible.
             widgets.active.bg_stroke.color = palette.text;
-            ui.add(Button::new(text.color(palette.on_accent)).min_size(min_size))
+            ui.add(Button::new(text.color(palette.on_accent)).min_size(vec2(0.0, space(7))))
         };
         ui.scope(coloured).inner
     }
-}
-
-/// Primary button.
-pub fn primary_button(text: impl Into<String>) -> impl Widget {
-    primary_button_of(text, vec2(0.0, space(7)))
 }
 
 /// Button as high as [`primary_button`], in the colour of controls.
@@ -135,7 +123,15 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
 ) -> Option<T> {
     let palette = Theme::of(ui).palette;
     let padding = 2.0;
-    let width = (ui.available_width() - 2.0 * padding) / options.len().max(1) as f32;
+    // Texts of different lengths share what they leave of the width.
+    let font = TextStyle::Button.resolve(ui.style());
+    let text_width = |text: &str| {
+        let galley = ui.painter().layout_no_wrap(text.to_owned(), font.clone(), palette.text);
+        galley.size().x + 6.0
+    };
+    let least: f32 = options.iter().map(|(_, text, _)| text_width(text)).sum();
+    let spare = (ui.available_width() - 2.0 * padding - least) / options.len().max(1) as f32;
+    let widths = Vec::from_iter(reading_order(ui, options).iter().map(|(_, text, _)| text_width(text)));
     let mut picked = None;
     let group = Frame::new()
         .fill(palette.raised)
@@ -144,23 +140,21 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
     let response = group
         .show(ui, |ui| {
             ui.spacing_mut().item_spacing.x = 0.0;
+            if fill_width {
+                ui.spacing_mut().button_padding.x = 3.0;
+            }
             // Options are flat until the pointer is over them.
             ui.visuals_mut().widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
             ui.visuals_mut().widgets.inactive.fg_stroke.color = palette.dim;
             ui.horizontal(|ui| {
-                for &(option, text, meaning) in reading_order(ui, options) {
+                for (&(option, text, meaning), width) in reading_order(ui, options).into_iter().zip(widths) {
                     let is_selected = option == selected;
-                    let min_width = if fill_width { width.floor() } else { 0.0 };
+                    let min_width = if fill_width { (width + spare).floor() } else { 0.0 };
                     let button = Button::selectable(is_selected, text)
                         .frame_when_inactive(true)
                         .corner_radius(radius() - 1)
                         .min_size(vec2(min_width, space(6)));
-                    let mut response = ui.add(button);
-                    if !meaning.is_empty() {
-                        response = response.on_hover_text(meaning);
-                    }
-                    let clicked = response.clicked();
-                    if clicked && !is_selected {
+                    if hinted(ui.add(button), meaning).clicked() && !is_selected {
                         picked = Some(option);
                     }
                 }
@@ -171,41 +165,29 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
     picked
 }
 
+/// Adds a tooltip; nothing if it is empty.
+pub fn hinted(response: Response, hint: &str) -> Response {
+    match hint {
+        "" => response,
+        _ => response.on_hover_text(hint),
+    }
+}
+
 /// Shows tabs, with the selected one underlined. Returns the tab that the user has just selected.
 pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)], selected: T) -> Option<T> {
     let palette = Theme::of(ui).palette;
     let mut picked = None;
     let response = ui
-        .horizontal(|ui| {
-            // As wide as when selected, so that no tab moves; closer to each other if there is little room.
-            let width = |text: &str| {
-                let galley = ui
-                    .painter()
-                    .layout_no_wrap(text.to_owned(), semibold(type_size().body), palette.text);
-                galley.size().x
-            };
-            let widths: Vec<f32> = tabs.iter().map(|(_, text)| width(text)).collect();
-            let spare = ui.available_width() - widths.iter().sum::<f32>();
-            let padding = (0.5 * spare / tabs.len() as f32)
-                .floor()
-                .clamp(0.5 * space(1), space(2) + 2.0);
+        .horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 0.0;
-            ui.spacing_mut().button_padding.x = padding;
-            for (&(tab, text), width) in tabs.iter().zip(widths) {
+            for &(tab, text) in tabs {
                 let is_selected = tab == selected;
                 let colour = if is_selected { palette.text } else { palette.dim };
-                let mut shown = RichText::new(text).color(colour);
-                if is_selected {
-                    shown = shown.font(semibold(type_size().body));
-                }
-                let button = Button::new(shown)
-                    .fill(Color32::TRANSPARENT)
-                    .stroke(Stroke::NONE)
-                    .min_size(vec2(width + 2.0 * padding, 0.0));
-                let tab_response = ui.add(button);
+                let button = Button::new(RichText::new(text).color(colour)).fill(Color32::TRANSPARENT);
+                let tab_response = ui.add(button.stroke(Stroke::NONE));
                 tab_response.widget_info(|| WidgetInfo::selected(Role::Tab, true, is_selected, text));
                 if is_selected || tab_response.hovered() {
-                    let line = tab_response.rect.x_range().shrink(padding);
+                    let line = tab_response.rect.x_range().shrink(space(2));
                     let colour = if is_selected { palette.accent } else { palette.line };
                     let below = tab_response.rect.bottom() + 1.0;
                     ui.painter().hline(line, below, Stroke::new(2.0, colour));
@@ -243,14 +225,6 @@ pub fn dim_ui(ui: &mut Ui, text: &str) -> Response {
     ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
-/// Shows a state after a dot of its colour, with a space to whatever follows in the line.
-pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
-    ui.spacing_mut().item_spacing.x = space(4);
-    let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
-    ui.painter().circle_filled(dot.center(), 4.0, colour);
-    ui.label(RichText::new(text).size(type_size().note));
-}
-
 /// Shows a progress bar over the available width: `name` is the name of the work, `text` is shown inside the bar.
 pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32, text: &str) -> Response {
     let palette = &Theme::of(ui).palette;
@@ -273,14 +247,6 @@ pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32, text: &str) -> Respo
         info
     });
     response
-}
-
-/// Shows the progress of work in percent at the right end of a status line.
-pub fn status_progress_ui(ui: &mut Ui, name: &str, share: f32) {
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        ui.set_max_width(space(40).min(ui.available_width()));
-        progress_bar_ui(ui, name, share, &format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0)));
-    });
 }
 
 /// Shows a sentence in the middle of an empty card: the reason why it is empty, and what to do.
@@ -317,16 +283,27 @@ pub fn fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str) {
 /// As [`fact_ui`], in a given colour.
 pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, colour: Color32) {
     let dim = Theme::of(ui).palette.dim;
-    ui.horizontal(|ui| {
-        let text = |text: &str| RichText::new(text).size(type_size().note);
-        ui.label(text(name).color(dim)).on_hover_text(meaning);
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let response = ui.add(Label::new(text(value).color(colour)).truncate());
-            let label = format!("{name}: {value}");
-            response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
-            response.on_hover_text(meaning);
+    let text = |text: &str| RichText::new(text).size(type_size().note);
+    let name_ui = |ui: &mut Ui| {
+        let label = ui.label(text(name).color(dim)).on_hover_text(meaning);
+        // The value is read with its name.
+        ui.ctx().accesskit_node_builder(label.id, |node| node.set_hidden());
+    };
+    let value_ui = |ui: &mut Ui| {
+        let response = ui.add(Label::new(text(value).color(colour)).wrap());
+        let label = format!("{name}: {value}");
+        response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
+        response.on_hover_text(meaning);
+    };
+    if ui.available_width() < space(56) {
+        name_ui(ui);
+        value_ui(ui);
+    } else {
+        ui.horizontal(|ui| {
+            name_ui(ui);
+            ui.with_layout(Layout::right_to_left(Align::Center), value_ui);
         });
-    });
+    }
 }
 
 /// Draws a focus ring around a widget that does not show the focus otherwise.
@@ -363,9 +340,9 @@ pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mu
         })
         .inner;
     focus_ring_ui(ui, &header);
-    let text_width =
-        ui.painter()
-            .layout_no_wrap(name.to_owned(), eframe::egui::TextStyle::Body.resolve(ui.style()), dim);
+    let text_width = ui
+        .painter()
+        .layout_no_wrap(name.to_owned(), TextStyle::Body.resolve(ui.style()), dim);
     let mut place = header.rect;
     place.min.x += space(7) + text_width.size().x + space(2);
     place.max.x -= space(1);
@@ -441,28 +418,26 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
             picked = to;
         }
     };
-    // The layout is right to left: next, number, previous.
-    let next = Some(shown + 1).filter(|next| *next < snapshots);
-    arrow_ui(ui, "›", next, "Next", "Page down");
+    let (title, window) = (format!("Test {what}"), ui.ctx().content_rect().width());
+    let dim = Theme::of(ui).palette.dim;
+    let label = (window >= 1200.0).then(|| ui.label(RichText::new(&title).color(dim)));
+    arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
     let mut number = shown + 1;
     let suffix = format!(" of {}", snapshots.max(1));
     let field = DragValue::new(&mut number).range(1..=snapshots.max(1)).suffix(suffix);
     let field = ui
         .add_enabled(snapshots > 0, field)
         .on_hover_text("Type a number, or drag.");
-    arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
-    if number != shown + 1 && snapshots > 0 {
-        picked = Some(number - 1);
-    }
-    let title = format!("Test {what}");
-    let dim = Theme::of(ui).palette.dim;
-    let font = FontId::proportional(type_size().body);
-    let width = ui.painter().layout_no_wrap(title.clone(), font, dim).size().x;
-    if ui.available_width() >= width {
-        let label = ui.label(RichText::new(&title).color(dim));
+    if let Some(label) = label {
         field.labelled_by(label.id);
     } else {
         ui.ctx().accesskit_node_builder(field.id, |node| node.set_label(title));
     }
-    picked
+    let next = Some(shown + 1).filter(|next| *next < snapshots);
+    arrow_ui(ui, "›", next, "Next", "Page down");
+    if number != shown + 1 && snapshots > 0 {
+        Some(number - 1)
+    } else {
+        picked
+    }
 }

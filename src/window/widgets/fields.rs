@@ -11,7 +11,7 @@ use eframe::egui::{
 };
 
 use super::{
-    components::{refusal_ui, take_refusal},
+    components::{hinted, refusal_ui, take_refusal},
     explained_options_ui,
     quantity_text::parse,
 };
@@ -21,9 +21,9 @@ use crate::window::theme::{Theme, space};
 /// refused input is shown below.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
     let field = ui.horizontal(|ui| {
-        let label = ui.label(name).on_hover_text(hint);
+        let label = hinted(ui.label(name), hint);
         let value = ui.with_layout(Layout::right_to_left(Align::Center), value_ui).inner;
-        value.labelled_by(label.id).on_hover_text(hint)
+        hinted(value.labelled_by(label.id), hint)
     });
     refusal_ui(ui, &field.inner);
     field.inner
@@ -37,8 +37,13 @@ pub fn count_ui(ui: &mut Ui, name: &str, hint: &str, value: &mut usize, limits: 
 
 /// Field for the seed of random numbers.
 pub fn seed_ui(ui: &mut Ui, name: &str, hint: &str, seed: &mut u64, usual: u64) -> Response {
-    let limits = usually(usual, 0..=u64::MAX);
-    field_ui(ui, name, hint, |ui| whole_ui(ui, seed, &limits, FIELD_SIZE))
+    // Larger ones cannot be typed, but those of files stay as they are.
+    let limits = usually(usual, 0..=(1 << f64::MANTISSA_DIGITS) - 1);
+    let shown = seed.to_string();
+    let shown = Shown { text: &shown, unit: "" };
+    field_ui(ui, name, hint, |ui| {
+        typed_number_ui(ui, seed, &limits, shown, FIELD_SIZE)
+    })
 }
 
 /// Field for a number with its unit; any notation, such as 1e-3, and other units of the same quantity can be typed.
@@ -66,13 +71,18 @@ pub fn percent_ui(
     let mut percent = in_percent(*share);
     let limits = usually(in_percent(usual), range_percent);
     if quantity_ui(ui, name, hint, &mut percent, limits, "%").changed() {
-        *share = to_twelve_digits(percent / 100.0);
+        *share = of_percent(percent);
     }
 }
 
 /// Returns a fraction of one in percent.
 pub fn in_percent(share: f64) -> f64 {
     to_twelve_digits(100.0 * share)
+}
+
+/// Returns a percentage as a fraction of one.
+pub fn of_percent(percent: f64) -> f64 {
+    to_twelve_digits(percent / 100.0)
 }
 
 /// Rounds to twelve digits: 100 · 0.07 would be shown as 7.000000000000001, and 0.7 % would differ from 0.007.
@@ -106,23 +116,36 @@ pub fn list_ui<T: Copy + PartialEq>(
     options: &[(T, &str, &str)],
     selected: T,
 ) -> Option<T> {
-    let shown = options.iter().find(|(option, ..)| *option == selected);
     let mut picked = None;
     field_ui(ui, name, hint, |ui| {
-        let combo = ComboBox::from_id_salt(name)
-            .selected_text(shown.map_or("", |(_, text, _)| *text))
-            .width(space(31));
-        let combo = combo.show_ui(ui, |ui| {
-            for &(option, text, meaning) in options {
-                let choice = ui.selectable_label(option == selected, text).on_hover_text(meaning);
-                if choice.clicked() && option != selected {
-                    picked = Some(option);
-                }
-            }
-        });
-        combo.response
+        combo_ui(ui, name, space(31), options, selected, &mut picked)
     });
     picked
+}
+
+/// Drop-down list of this width without its name; a newly selected option is `picked`.
+pub fn combo_ui<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    name: &str,
+    width: f32,
+    options: &[(T, &str, &str)],
+    selected: T,
+    picked: &mut Option<T>,
+) -> Response {
+    let shown = options.iter().find(|(option, ..)| *option == selected);
+    let combo = ComboBox::from_id_salt(name)
+        .selected_text(shown.map_or("", |(_, text, _)| *text))
+        .width(width)
+        .height(space(90));
+    let combo = combo.show_ui(ui, |ui| {
+        for &(option, text, meaning) in options {
+            let choice = hinted(ui.selectable_label(option == selected, text), meaning);
+            if choice.clicked() && option != selected {
+                *picked = Some(option);
+            }
+        }
+    });
+    combo.response
 }
 
 /// Slider `width` points wide. On a double click, the caller should reset the value to its default.
@@ -217,24 +240,7 @@ pub fn usually<N>(usual: N, range: RangeInclusive<N>) -> Limits<N> {
 pub fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, limits: &Limits<N>, unit: &str, size: Vec2) -> Response {
     let shown = input_text(value.to_f64());
     let shown = Shown { text: &shown, unit };
-    typed_number_ui(ui, value, limits, shown, size).0
-}
-
-/// As [`number_ui`], for a whole number with full 64-bit precision.
-pub fn whole_ui(ui: &mut Ui, value: &mut u64, limits: &Limits<u64>, size: Vec2) -> Response {
-    let shown = value.to_string();
-    let before = *value;
-    let (mut response, typed) = typed_number_ui(ui, value, limits, Shown { text: &shown, unit: "" }, size);
-    // The number field computes with fewer digits.
-    if let Some(exact) = typed.and_then(|typed| typed.trim().parse().ok())
-        && limits.range.contains(&exact)
-    {
-        *value = exact;
-        if exact != before {
-            response.mark_changed();
-        }
-    }
-    response
+    typed_number_ui(ui, value, limits, shown, size)
 }
 
 /// Text of a value, and its unit.
@@ -244,14 +250,13 @@ struct Shown<'a> {
     unit: &'a str,
 }
 
-/// Shows a field. Also returns a typed text that was accepted.
 fn typed_number_ui<N: Numeric>(
     ui: &mut Ui,
     value: &mut N,
     limits: &Limits<N>,
     Shown { text: shown, unit }: Shown<'_>,
     size: Vec2,
-) -> (Response, Option<String>) {
+) -> Response {
     let range = limits.range.start().to_f64()..=limits.range.end().to_f64();
     // Dragging changes a value by 1 % per point, a whole number by at least 1 per ten points.
     let speed = (0.01 * value.to_f64().abs()).max(if N::INTEGRAL { 0.1 } else { 1e-12 });
@@ -260,10 +265,11 @@ fn typed_number_ui<N: Numeric>(
     } else {
         format!(" {unit}")
     };
-    let tried: RefCell<Option<(String, Result<f64, String>)>> = RefCell::new(None);
+    let tried = RefCell::new(None);
     let before = *value;
     let drag = DragValue::new(value)
         .range(limits.range.clone())
+        .clamp_existing_to_range(false)
         .speed(speed)
         .suffix(suffix)
         .update_while_editing(false)
@@ -277,7 +283,7 @@ fn typed_number_ui<N: Numeric>(
         .custom_parser(|text| {
             let parsed = parse(text, unit, &range, N::INTEGRAL);
             let value = parsed.as_ref().ok().copied();
-            *tried.borrow_mut() = Some((text.to_owned(), parsed));
+            *tried.borrow_mut() = Some(parsed.map(drop));
             value
         });
     let mut response = ui.add_sized(size, drag);
@@ -288,12 +294,8 @@ fn typed_number_ui<N: Numeric>(
     if *value != before {
         response.mark_changed();
     }
-    let (typed, tried) = tried.into_inner().map_or((None, None), |(text, tried)| {
-        let taken = tried.is_ok().then_some(text);
-        (taken, Some(tried.map(drop)))
-    });
-    take_refusal(ui, &response, tried, &value.to_f64().to_string());
-    (response, typed)
+    take_refusal(ui, &response, tried.into_inner(), &value.to_f64().to_string());
+    response
 }
 
 /// Usual size of a field, in points.

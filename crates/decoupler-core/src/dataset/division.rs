@@ -24,13 +24,13 @@ pub struct Division {
 
 /// Samples of each part of a divided set, as ascending indices.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct DividedSamples {
+pub struct DividedSamples {
     /// Samples that the training method fits.
-    pub(crate) training: Vec<usize>,
+    pub training: Vec<usize>,
     /// Samples that select the best weights; empty if nothing is held out.
-    pub(crate) validation: Vec<usize>,
+    pub validation: Vec<usize>,
     /// Samples that no fit has seen; empty if the test set is a separate file.
-    pub(crate) test: Vec<usize>,
+    pub test: Vec<usize>,
 }
 
 impl Default for Division {
@@ -67,15 +67,11 @@ impl Division {
         Ok((parts.split(set), test))
     }
 
-    /// Returns the training samples of [`Self::sets`], as ascending indices.
+    /// Returns the samples of each part of [`Self::sets`].
     ///
     /// # Errors
     /// If a share is out of range, or the set is a single unit.
-    pub fn training(&self, set: &Dataset, has_test_set: bool, seed: Seed) -> Result<Vec<usize>, DatasetError> {
-        Ok(self.divide(set, has_test_set, seed)?.training)
-    }
-
-    fn divide(&self, set: &Dataset, has_test_set: bool, seed: Seed) -> Result<DividedSamples, DatasetError> {
+    pub fn divide(&self, set: &Dataset, has_test_set: bool, seed: Seed) -> Result<DividedSamples, DatasetError> {
         self.check()?;
         let test_fraction = if has_test_set { 0.0 } else { self.test_fraction };
         let mut units = self.by.ordered_units(set, &mut seed.rng(Stream::Split));

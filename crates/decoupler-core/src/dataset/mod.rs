@@ -19,8 +19,7 @@ mod seed;
 mod simulation;
 
 pub use continuation::{GAP, Place, RowOrder, Series};
-pub(crate) use division::DividedSamples;
-pub use division::{Division, Split, SplitBy};
+pub use division::{DividedSamples, Division, Split, SplitBy};
 pub use error::DatasetError;
 pub use folds::Folds;
 pub use frames::PerRow;

@@ -154,9 +154,24 @@ impl DecoderSet {
             return Ok(None);
         };
         let fit_seconds = begun.elapsed().as_secs_f64();
-        let answers = decode_set(&mut *decoder, test)?;
+        self.report((kind, precision), &mut *decoder, fit_seconds, test)
+            .map(Some)
+    }
+
+    /// Measures the speed of a fitted decoder and its errors on `test`.
+    ///
+    /// # Errors
+    /// As [`Self::decoder`], or if a reading cannot be decoded.
+    pub fn report(
+        &self,
+        (kind, precision): (DecoderKind, Precision),
+        decoder: &mut dyn Decoder,
+        fit_seconds: f64,
+        test: &Dataset,
+    ) -> Result<DecoderReport, RunError> {
+        let answers = decode_set(decoder, test)?;
         let solved = decoder.take_solved_rows();
-        let frame_us = frame_us(&mut *decoder, test)?;
+        let frame_us = frame_us(decoder, test)?;
         let mean = self.decoder(DecoderKind::Mean, Precision::Double)?;
         let mut mean = mean.expect("the mean needs neither networks nor a sensor");
         let mean = TestErrors::measure(&self.problem, test, &decode_set(&mut *mean, test)?);
@@ -167,7 +182,7 @@ impl DecoderSet {
         let mut remarks = worse_than_mean(&errors, &mean, &cause(kind, &self.settings, size, None));
         remarks.extend(missing_figures(precision, &errors, residual).map(str::to_owned));
         remarks.extend((!solved.are_reliable()).then(|| solved.to_string()));
-        Ok(Some(DecoderReport {
+        Ok(DecoderReport {
             kind,
             precision,
             errors,
@@ -176,7 +191,7 @@ impl DecoderSet {
             solved,
             frame_us,
             fit_seconds,
-        }))
+        })
     }
 }
 

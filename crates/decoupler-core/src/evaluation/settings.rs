@@ -248,6 +248,7 @@ impl RunSettings {
     pub(super) fn published_by(&self, cross_validation: bool) -> Option<PublishedErrors> {
         let simulation = self.simulation()?;
         let is_papers = simulation.scene == Scene::default() && self.inputs == InputChoice::PAPER;
+        let is_papers = is_papers && matches!(self.training.method, Method::LevenbergMarquardt(_));
         let (array, samples) = (simulation.sensor.scale, simulation.samples);
         PublishedErrors::of(array, self.hidden, samples, cross_validation).filter(|_| is_papers)
     }

@@ -104,17 +104,18 @@ fn figures(of: &experiments::Cell) -> Vec<CellFigure> {
     for (measure, figure) in of.errors().filter(|(measure, _)| *measure != ErrorMeasure::ZMm) {
         let (published, median, kind) = match measure {
             ErrorMeasure::ZPercent => ("Z % publ.", "Z % median", Ranking),
-            ErrorMeasure::XPercent => ("X % publ.", "X % median", Other),
-            ErrorMeasure::YPercent => ("Y % publ.", "Y % median", Other),
+            ErrorMeasure::XPercent | ErrorMeasure::YPercent => ("X % publ.", "X % median", Other),
             ErrorMeasure::R2 => ("", "R² median", Other),
             _ => ("", "error % median", Ranking),
         };
+        // Y is constant.
+        let shown = |heading, kind| (measure != ErrorMeasure::YPercent).then_some((heading, kind));
         let of_ranking = |heading| (kind == Ranking).then_some((heading, Other));
         let name = |statistic: &str| format!("{}_{statistic}", measure.field());
         // Nothing is published for a recording.
-        figures.extend(is_array.then(|| (name("published"), Some((published, Published)), figure.published.into())));
+        figures.extend(is_array.then(|| (name("published"), shown(published, Published), figure.published.into())));
         figures.extend([
-            (name("median"), Some((median, kind)), figure.median.into()),
+            (name("median"), shown(median, kind), figure.median.into()),
             (name("min"), of_ranking("min"), figure.min.into()),
             (name("max"), of_ranking("max"), figure.max.into()),
         ]);

@@ -279,7 +279,7 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
     let division = recordings.recorded.plan.division;
     let mut warnings = target_remarks(training, division.by, inputs, targets);
     // In time, the first samples are those for testing unless they are for training.
-    let trained = division.training(set, false, Seed(0));
+    let trained = division.divide(set, false, Seed(0)).map(|parts| parts.training);
     let tests_first = trained.is_ok_and(|samples| samples.first() != Some(&0));
     if division.by == SplitBy::Time && recordings.test.is_none() && tests_first {
         let text = "all changes of the targets are in the last part of the recording, so that the first part was held out \

@@ -25,11 +25,11 @@ pub use drawing::{Align, Bounds, Colour, Measure, Shape, Stroke};
 pub use heat_map::{HeatMap, HeatMapDrawing};
 pub use of_epochs::{EpochOutline, compared_losses_figure, loss_figure, training_state_figure};
 pub use of_errors::{
-    Decoded, ErrorBins, RegressionLine, histogram_figure, pair_address, pair_sample, regression_figure, value_pairs,
+    Decoded, RegressionLine, histogram_figure, pair_address, pair_sample, regression_figure, value_pairs,
 };
 pub use of_experiment::experiment_figure;
 pub use of_recorded::{TargetSurface, hysteresis_figure, position_error_map};
-pub use of_sample::{node_figure, readings_figure, sample_figure, singular_values_figure, targets_over_time_figure};
+pub use of_sample::{TimeSeries, node_figure, readings_figure, singular_values_figure};
 pub use of_trade_off::{
     TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure, training_time,
 };
@@ -270,7 +270,7 @@ mod summary_tests {
     #[test]
     fn bars_and_clouds_of_points_are_described_by_their_extent() {
         let pairs: Vec<(f64, f64)> = [-0.2, 0.0, 0.0, 0.2].map(|error| (4.0, 4.0 + error)).into();
-        let histogram = histogram_figure(&pairs, None, Decoded::Nodes).summary();
+        let histogram = histogram_figure(&pairs, Decoded::Nodes).summary();
         assert_eq!(
             histogram,
             "nodes of the test set against error of z (mm), decoupled − actual: 41 bars, the highest 2 at 0; no error at 0."

@@ -59,75 +59,30 @@ pub fn pair_address(test: &Dataset, pair: usize) -> Option<NodeAddress> {
     Some(NodeAddress { snapshot, row, node })
 }
 
-/// Bins of a histogram of errors, symmetric about 0, with the same number on either side of the middle one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ErrorBins {
-    /// In the unit of the values.
-    width: f64,
-}
+/// Number of bars of a histogram of errors.
+const BARS: usize = 41;
 
-impl ErrorBins {
-    /// Number of bins.
-    pub const COUNT: usize = 41;
-
-    /// Returns the bins that contain all finite errors of these pairs of actual and decoded values.
-    pub fn new(pairs: &[(f64, f64)]) -> Self {
-        let errors = pairs.iter().map(|(actual, decoded)| (decoded - actual).abs());
-        let largest = errors.filter(|error| error.is_finite()).fold(0.0, f64::max);
-        // Without errors, any width will do.
-        let half = if largest > 0.0 { largest } else { 1.0 };
-        let width = half / (Self::COUNT / 2) as f64;
-        Self { width }
-    }
-
-    /// Returns the bin of an error; `None` if it is not a number or beyond them.
-    pub fn bin(&self, error: f64) -> Option<usize> {
-        let bin = (error / self.width).round() + (Self::COUNT / 2) as f64;
-        (0.0..Self::COUNT as f64).contains(&bin).then_some(bin as usize)
-    }
-
-    /// Returns the range of errors in a bin, in the unit of the values.
-    pub fn range(&self, bin: usize) -> [f64; 2] {
-        [-0.5, 0.5].map(|half| self.width * (bin as f64 - (Self::COUNT / 2) as f64 + half))
-    }
-
-    /// Returns the pairs in a bin, those with the largest error first.
-    pub fn pairs_in(&self, bin: usize, pairs: &[(f64, f64)]) -> Vec<usize> {
-        let error = |pair: usize| pairs[pair].1 - pairs[pair].0;
-        let in_bin = (0..pairs.len()).filter(|&pair| self.bin(error(pair)) == Some(bin));
-        let mut found: Vec<usize> = in_bin.collect();
-        found.sort_by(|&one, &other| error(other).abs().total_cmp(&error(one).abs()));
-        found
-    }
-
-    fn counts(&self, pairs: &[(f64, f64)]) -> [usize; Self::COUNT] {
-        let mut counts = [0; Self::COUNT];
-        let bins = pairs.iter().filter_map(|(actual, decoded)| self.bin(decoded - actual));
-        bins.for_each(|bin| counts[bin] += 1);
-        counts
-    }
-}
-
-/// Distribution of the errors (decoded − actual), in [`ErrorBins`]; the bar `chosen` is highlighted.
-pub fn histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, of: Decoded<'_>) -> PlotFigure {
+/// Distribution of the errors (decoded − actual) in bars of the same width, the middle one around 0.
+pub fn histogram_figure(pairs: &[(f64, f64)], of: Decoded<'_>) -> PlotFigure {
     let (name, unit, [answer, samples]) = of.words();
-    let bins = ErrorBins::new(pairs);
-    let counts = bins.counts(pairs);
-    let bars = |name: &str, ink: Ink, is_chosen: bool| {
-        let shown = (0..ErrorBins::COUNT).filter(|&bin| (Some(bin) == chosen) == is_chosen);
-        let points = shown.map(|bin| {
-            let middle = bins.width * (bin as f64 - (ErrorBins::COUNT / 2) as f64);
-            PlotPoint::from([middle, counts[bin] as f64]).of_item(bin)
-        });
-        let mut series = Series::new(name, Look::line(ink, None), points).listed(None);
-        series.form = Form::Bars(0.92 * bins.width);
-        series
-    };
+    let errors = pairs.iter().map(|(actual, decoded)| decoded - actual);
+    let errors = errors.filter(|error| error.is_finite());
+    let largest = errors.clone().fold(0.0, |largest: f64, error| largest.max(error.abs()));
+    // Without errors, any width will do.
+    let half = if largest > 0.0 { largest } else { 1.0 };
+    let width = half / (BARS / 2) as f64;
+    let mut counts = [0; BARS];
+    errors.for_each(|error| counts[((error / width).round() + (BARS / 2) as f64) as usize] += 1);
+    let bars = counts.iter().enumerate().map(|(bar, &count)| {
+        let middle = width * (bar as f64 - (BARS / 2) as f64);
+        PlotPoint::from([middle, f64::from(count)]).of_item(bar)
+    });
+    let mut bars = Series::new(samples, Look::line(Ink::Blue, None), bars).listed(None);
+    bars.form = Form::Bars(0.92 * width);
     let x = PlotAxis::linear(format!("error of {}, {answer} − actual", titled(name, unit)));
     let y = PlotAxis::linear(format!("{samples} of the test set")).including([0.0]);
-    let chosen = bars(&format!("chosen {samples}"), Ink::Orange, true);
     let no_error = Series::across("no error", LineAt::X(0.0), Ink::Grey, LineStyle::Dashed);
-    Plot::new(x, y, [bars(samples, Ink::Blue, false), chosen, no_error]).into()
+    Plot::new(x, y, [bars, no_error]).into()
 }
 
 /// Least-squares line through pairs of actual and decoded values, and the range of the actual ones. A regression figure
@@ -213,50 +168,22 @@ mod tests {
 
     #[test]
     fn every_finite_error_is_counted_once_and_zero_is_in_the_middle() {
-        let pairs = [0.0, 0.0, 1.0, -1.0, 0.5, f64::NAN].map(|error| (4.0, 4.0 + error));
-        let bins = ErrorBins::new(&pairs);
-        let counts = bins.counts(&pairs);
-        assert_eq!(counts.iter().sum::<usize>(), 5);
-        assert_eq!(
-            (counts[0], counts[ErrorBins::COUNT / 2], counts[ErrorBins::COUNT - 1]),
-            (1, 2, 1)
-        );
-        assert!((bins.width - 0.05).abs() < 1e-15);
-        assert_eq!(ErrorBins::new(&[]).counts(&[]), [0; ErrorBins::COUNT]);
-        assert_eq!(
-            ErrorBins::new(&[(4.0, 4.0); 3]).counts(&[(4.0, 4.0); 3])[ErrorBins::COUNT / 2],
-            3
-        );
-    }
-
-    #[test]
-    fn a_bar_contains_the_nodes_whose_errors_it_spans() {
-        let pairs: Vec<(f64, f64)> = (0..200).map(|i| (4.0, 4.0 + (f64::from(i) * 0.731).sin())).collect();
-        let bins = ErrorBins::new(&pairs);
-        let mut held = 0;
-        for bin in 0..ErrorBins::COUNT {
-            let [low, high] = bins.range(bin);
-            let found = bins.pairs_in(bin, &pairs);
-            held += found.len();
-            let errors: Vec<f64> = found.iter().map(|&pair| pairs[pair].1 - pairs[pair].0).collect();
-            assert!(
-                errors.iter().all(|error| (low..=high).contains(error)),
-                "{low} to {high}: {errors:?}"
-            );
-            assert!(
-                errors.windows(2).all(|pair| pair[0].abs() >= pair[1].abs()),
-                "{errors:?}"
-            );
+        let finite = (0..200).map(|i| (f64::from(i) * 0.731).sin()).chain([0.0, 1.0, -1.0]);
+        let pairs = Vec::from_iter(finite.chain([f64::NAN]).map(|error| (4.0, 4.0 + error)));
+        let figure = histogram_figure(&pairs, Decoded::Nodes);
+        let bars = &figure.plots[0].series[0];
+        let Form::Bars(width) = bars.form else {
+            panic!("{bars:?}");
+        };
+        for bar in &bars.points {
+            let within = |(actual, decoded): &&(f64, f64)| (decoded - actual - bar.x).abs() < 0.5 * width / 0.92;
+            assert_eq!(pairs.iter().filter(within).count() as f64, bar.y, "{bar:?}");
         }
-        assert_eq!(held, pairs.len());
-        let figure = histogram_figure(&pairs, Some(3), Decoded::Nodes);
-        let bars = figure.plots[0]
-            .series
-            .iter()
-            .filter(|series| matches!(series.form, Form::Bars(_)))
-            .map(|series| series.points.len())
-            .collect::<Vec<_>>();
-        assert_eq!(bars, [ErrorBins::COUNT - 1, 1]);
+        assert_eq!(bars.points.iter().map(|bar| bar.y).sum::<f64>(), 203.0);
+        assert_eq!(
+            histogram_figure(&[(4.0, 4.0); 3], Decoded::Nodes).plots[0].series[0].points[BARS / 2].y,
+            3.0
+        );
     }
 
     #[test]
@@ -272,10 +199,11 @@ mod tests {
         assert_eq!(pair_sample(&test, off), Some(30_000));
         assert_eq!(pair_sample(&test, pairs.len()), None);
         let force = Channel::new("force", Some("N"));
-        let figure = histogram_figure(&pairs, ErrorBins::new(&pairs).bin(2.0), Decoded::Target(&force));
+        let figure = histogram_figure(&pairs, Decoded::Target(&force));
         let plot = &figure.plots[0];
         assert_eq!(plot.x.name, "error of force (N), decoded − actual");
-        assert_eq!((plot.series[1].points[0].x, plot.series[1].points[0].y), (2.0, 1.0));
+        let last = plot.series[0].points.last().unwrap();
+        assert_eq!((last.x, last.y), (2.0, 1.0));
     }
 
     #[test]

@@ -36,7 +36,7 @@ pub fn experiment_figure(results: &ExperimentResults) -> Figure {
 fn error_name(results: &ExperimentResults) -> (&'static str, &'static str) {
     match results.experiment.recording {
         None => ("Z error", "%"),
-        Some(_) => ("mean absolute error", "% of range"),
+        Some(_) => ("MAE", "% of range"),
     }
 }
 
@@ -133,7 +133,7 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     PlotFigure::new(std::iter::once(plot).chain(r2), [])
 }
 
-/// The errors of every trial, one plot each for Z, X and Y; of a recording, the mean absolute error.
+/// The errors of every trial, one plot each for Z and X (Y is constant); of a recording, the mean absolute error.
 fn repeats(results: &ExperimentResults) -> PlotFigure {
     const HUES: [Ink; 4] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Grey];
     let experiment = &results.experiment;
@@ -146,14 +146,12 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
     let errors = [
         (linear(&titled(error, Some(unit))), ranked),
         (linear("X error (%)"), ErrorMeasure::XPercent),
-        // Y is constant, so its error may be exactly 0 or of the size of rounding errors.
-        (PlotAxis::logarithmic("Y error (%)"), ErrorMeasure::YPercent),
     ];
     let trials = results.cells.iter().map(|cell| cell.expected).max().unwrap_or(1);
     let names = labels(&experiment.axis).into_iter();
     let names = names.map(|label| format!("{label} {}", experiment.axis.kind.name()));
     let cells: Vec<(String, Ink)> = names.zip(HUES.into_iter().cycle()).collect();
-    let count = if experiment.recording.is_some() { 1 } else { 3 };
+    let count = if experiment.recording.is_some() { 1 } else { 2 };
     let plots = errors.into_iter().take(count).map(|(y, measure)| {
         let x = PlotAxis::integers(if experiment.seeds == 1 { "repeat" } else { "trial" });
         let of_cells = || results.cells.iter().zip(&cells);
@@ -169,14 +167,8 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
         Plot::new(x.including([0.5, trials as f64 + 0.5]), y, series.chain(lines))
     });
     let plots = Vec::from_iter(plots);
-    let median = |cell: &Cell| cell.error(ErrorMeasure::YPercent)?.median;
-    let has_zero = results.cells.iter().any(|cell| median(cell) == Some(0.0));
     let has_lines = plots.iter().any(|plot| plot.lines_across().next().is_some());
-    let notes = [
-        has_lines.then_some("Dashed lines: published."),
-        has_zero.then_some("Y is constant: its error is 0 and lies below the axis."),
-    ];
-    PlotFigure::new(plots, notes.into_iter().flatten().map(str::to_owned))
+    PlotFigure::new(plots, has_lines.then(|| "Dashed lines: published.".to_owned()))
 }
 
 /// Error of each trial of a cell against the number of the trial, counted from 1 through all seeds (Fig. 5).

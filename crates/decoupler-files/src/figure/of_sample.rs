@@ -1,60 +1,24 @@
-//! Figures of all targets of one sample or over time, of decoupled next to actual nodes, of the singular values of each row,
+//! Figures of targets over time, of decoupled next to actual nodes, of the singular values of each row,
 //! and of the readings of a frame.
 
-use std::sync::Arc;
+use std::ops::{Range, RangeInclusive};
 
 use decoupler_core::{evaluation::Intervals, identifiability::Identifiability, problem::Channel, text::format_number};
 use glam::DVec3;
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 
 use super::{
     Ink, LineStyle, Look, Marker,
     axis::{PlotAxis, Scale},
     colour_map::SequentialMap,
+    extremes,
     heat_map::HeatMap,
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
-    titled, unique_by, with_unit,
+    plot::{Form, LineAt, Plot, PlotFigure, PlotPoint, Series},
 };
 
 /// Looks of actual and of decoded values next to each other.
 const ACTUAL: Look = Look::marker(Ink::Grey, Marker::Square);
 const DECODED: Look = Look::marker(Ink::Blue, Marker::Disc);
-
-/// Maximum number of targets whose names fit below the axis.
-const MAX_NAMES: usize = 12;
-
-/// All targets of a sample in their order: actual as squares, decoded as discs. Targets of one unit share its axis;
-/// with several units, each is shown in percent of its range; `ranges` are the minimum and maximum of each.
-pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], ranges: &[(f64, f64)]) -> PlotFigure {
-    let unit = targets.first().and_then(|target| target.unit.as_deref());
-    let has_one_unit = targets.iter().all(|target| target.unit.as_deref() == unit);
-    let place = |(low, high): (f64, f64), value: f64| match has_one_unit {
-        true => value,
-        false => 100.0 * (value - low) / (high - low),
-    };
-    let has_names = targets.len() <= MAX_NAMES;
-    // Targets without names are counted from 1.
-    let first = if has_names { 0.0 } else { 1.0 };
-    let series = |name: &str, look: Look, values: &[f64]| {
-        let points = values.iter().enumerate().map(|(number, &value)| {
-            let (target, y) = (&targets[number], place(ranges[number], value));
-            let value = with_unit(format_number(value), target.unit.as_deref());
-            let point = PlotPoint::from([first + number as f64, y]).of_item(number);
-            point.noted(format!("{}\n{name}: {value}", target.name))
-        });
-        Series::new(name, look, points)
-    };
-    let y = match has_one_unit {
-        true => titled("value", unit),
-        false => "% of the target's range".to_owned(),
-    };
-    let x = match has_names {
-        true => PlotAxis::of_names("target", targets.iter().map(|target| target.name.clone()).collect()),
-        false => PlotAxis::integers("target").including([0.5, targets.len() as f64 + 0.5]),
-    };
-    let series = [series("actual", ACTUAL, actual), series("decoded", DECODED, decoded)];
-    Plot::new(x, PlotAxis::linear(y), series).into()
-}
 
 /// Values below the largest by this factor are rounding errors.
 const ROUNDING: f64 = 1e-16;
@@ -114,47 +78,95 @@ pub fn node_figure(
     Plot::new(x, PlotAxis::linear("z (mm)"), [actual, decoupled]).into()
 }
 
-const HUES: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Violet, Ink::Cyan, Ink::Red];
-/// Maximum number of targets with their own colours and names; more targets are all drawn as fine lines.
-const MAX_CURVES: usize = 2 * HUES.len();
+/// Values of targets over time, or in the order of their samples.
+pub struct TimeSeries<'a> {
+    /// Names and units.
+    pub targets: &'a [Channel],
+    /// The horizontal axis.
+    pub axis: PlotAxis,
+    /// Place of each sample on it, ascending.
+    pub places: &'a [f64],
+    /// First sample after each gap, ascending.
+    pub gaps: &'a [usize],
+    /// Decoded values, samples × targets.
+    pub decoded: ArrayView2<'a, f64>,
+    /// Actual values, if they are known.
+    pub actual: Option<ArrayView2<'a, f64>>,
+    /// 90 % intervals of the decoded values, if they were calibrated.
+    pub intervals: Option<&'a Intervals>,
+}
 
-/// Values of all targets over time, one plot per unit; `history` has times in seconds with a value for each target. Fine
-/// lines limit the band of the 90 % `intervals`, if there are any and targets have their own colours.
-pub fn targets_over_time_figure(
-    targets: &[Channel],
-    history: &[(f64, Arc<[f64]>)],
-    intervals: Option<&Intervals>,
-) -> PlotFigure {
-    let has_names = targets.len() <= MAX_CURVES;
-    let ink = |target: usize| HUES[target % HUES.len()];
-    let series = |target: usize| {
-        let style = match target / HUES.len() {
-            _ if !has_names => LineStyle::Fine,
-            0 => LineStyle::Solid,
-            _ => LineStyle::Dashed,
+impl TimeSeries<'_> {
+    /// Plots of these targets one below the other, with the samples between the places `seen`. A gap breaks the lines; of many
+    /// samples, each curve shows the extremes.
+    pub fn figure(&self, targets: Range<usize>, seen: &RangeInclusive<f64>) -> PlotFigure {
+        /// Parts of the axis that are narrower than a pixel.
+        const PARTS: usize = 2000;
+        let [from, to] = [*seen.start(), *seen.end()];
+        // The lines go on to the samples beyond either end.
+        let first = self.places.partition_point(|place| *place < from).saturating_sub(1);
+        let end = (self.places.partition_point(|place| *place <= to) + 1).min(self.places.len());
+        let step = end.saturating_sub(first).div_ceil(PARTS).max(1);
+        let starts = self.gaps.iter().copied().filter(|gap| (first + 1..end).contains(gap));
+        let starts = Vec::from_iter(std::iter::once(first).chain(starts).chain([end]));
+        let parts = Vec::from_iter(starts.windows(2).flat_map(|ends| {
+            let parts = (ends[0]..ends[1])
+                .step_by(step)
+                .map(|at| Some(at..(at + step).min(ends[1])));
+            Vec::from_iter(parts.chain([None]))
+        }));
+        let gap = || PlotPoint::from([f64::NAN; 2]);
+        let curve = |name: &str, ink: Ink, value: &dyn Fn(usize) -> f64| {
+            let points = parts.iter().flat_map(|part| {
+                let extremes = part.clone().and_then(|part| extremes(part, |&sample| value(sample)));
+                let Some((low, high)) = extremes else {
+                    return vec![gap()];
+                };
+                let mut samples = vec![low.min(high), low.max(high)];
+                samples.dedup();
+                Vec::from_iter(
+                    samples
+                        .into_iter()
+                        .map(|sample| PlotPoint::from([self.places[sample], value(sample)])),
+                )
+            });
+            Series::new(name, Look::line(ink, LineStyle::Solid), points)
         };
-        let points = history.iter().map(|(time_s, values)| [*time_s, values[target]]);
-        let series = Series::new(&targets[target].name, Look::line(ink(target), style), points);
-        series.listed(has_names.then(|| targets[target].title()).as_deref())
-    };
-    let intervals = intervals.filter(|_| has_names);
-    let limit = |target: usize, side: &str, sign: f64| {
-        let points = history.iter().filter_map(|(time_s, values)| {
-            let half_width = intervals?.half_width(target, values[target])?;
-            Some([*time_s, values[target] + sign * half_width])
+        let plots = targets.map(|target| {
+            let decoded = |sample: usize| self.decoded[[sample, target]];
+            let band = parts.iter().map(|part| {
+                let limits = part.iter().cloned().flatten().filter_map(|sample| {
+                    let half_width = self.intervals?.half_width(target, decoded(sample))?;
+                    Some([-1.0, 1.0].map(|sign| decoded(sample) + sign * half_width))
+                });
+                let limits = limits.reduce(|one, other| [one[0].min(other[0]), one[1].max(other[1])]);
+                let (Some(part), Some(bar)) = (part, limits) else {
+                    return gap();
+                };
+                let mut point = PlotPoint::from([self.places[part.start], 0.5 * (bar[0] + bar[1])]);
+                point.bar = Some(bar);
+                point
+            });
+            let band = Series {
+                form: Form::Band,
+                ..Series::new("90 % interval", Look::line(Ink::Blue, None), band)
+            };
+            let actual = self
+                .actual
+                .map(|actual| curve("actual", Ink::Text, &|sample| actual[[sample, target]]));
+            let decoded = curve("decoded", Ink::Blue, &decoded);
+            let series = self.intervals.map(|_| band).into_iter().chain(actual).chain([decoded]);
+            Plot::new(
+                self.axis.clone().including([from, to]),
+                PlotAxis::linear(self.targets[target].title()),
+                series,
+            )
         });
-        let name = format!("{}, {side} limit of the 90 % interval", targets[target].name);
-        Series::new(name, Look::line(ink(target), LineStyle::Fine), points).listed(None)
-    };
-    let units = unique_by(targets.iter().map(|target| target.unit.as_deref()), |unit| *unit);
-    let plots = units.into_iter().map(|unit| {
-        let of_unit = (0..targets.len()).filter(|&target| targets[target].unit.as_deref() == unit);
-        let limits = |target: usize| [limit(target, "lower", -1.0), limit(target, "upper", 1.0)];
-        let series = of_unit.clone().map(series).chain(of_unit.flat_map(limits));
-        let y = PlotAxis::linear(titled("decoded value", unit));
-        Plot::new(PlotAxis::linear("time (s)"), y, series)
-    });
-    PlotFigure::new(plots, [])
+        PlotFigure {
+            is_stacked: true,
+            ..PlotFigure::new(plots, [])
+        }
+    }
 }
 
 /// Readings of a frame, rows × columns, as their drop below the unloaded state.
@@ -181,49 +193,6 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-
-    fn channels(units: [Option<&str>; 2]) -> [Channel; 2] {
-        units.map(|unit| Channel::new("f", unit))
-    }
-
-    #[test]
-    fn targets_of_several_units_are_shown_by_their_ranges() {
-        let ranges = [(0.0, 10.0), (-1.0, 1.0)];
-        let figure = |units| sample_figure(&channels(units), &[5.0, 0.5], &[4.0, -1.0], &ranges);
-        let heights = |figure: &PlotFigure| -> Vec<f64> {
-            figure.plots[0]
-                .series
-                .iter()
-                .flat_map(|series| series.points.iter().map(|point| point.y))
-                .collect()
-        };
-        let alike = figure([Some("N"), Some("N")]);
-        assert_eq!(heights(&alike), [5.0, 0.5, 4.0, -1.0]);
-        assert_eq!(alike.plots[0].y.name, "value (N)");
-        let apart = figure([Some("N"), Some("mm")]);
-        assert_eq!(heights(&apart), [50.0, 75.0, 40.0, 0.0]);
-        assert_eq!(
-            apart.plots[0].series[1].points[1].note.as_deref(),
-            Some("f\ndecoded: -1.00 mm")
-        );
-    }
-
-    #[test]
-    fn many_targets_are_counted_from_one() {
-        let channel = Channel::new("t", None);
-        let places = |count: usize| -> Vec<f64> {
-            let values = vec![0.5; count];
-            let figure = sample_figure(
-                &vec![channel.clone(); count],
-                &values,
-                &values,
-                &vec![(0.0, 1.0); count],
-            );
-            figure.plots[0].series[0].points.iter().map(|point| point.x).collect()
-        };
-        assert_eq!(places(3), [0.0, 1.0, 2.0], "these are at their names");
-        assert_eq!(places(13), Vec::from_iter((1..=13).map(f64::from)));
-    }
 
     #[test]
     fn patterns_without_effect_are_not_on_a_logarithmic_axis() {
@@ -274,39 +243,59 @@ mod live_tests {
 
     use super::*;
 
-    #[test]
-    fn targets_of_one_unit_share_a_plot() {
-        let channel = |name: &str, unit: &str| Channel::new(name, Some(unit));
-        let targets = [channel("x", "mm"), channel("force", "N"), channel("y", "mm")];
-        let history = [(0.0, Arc::from([1.0, 2.0, 3.0])), (0.5, Arc::from([4.0, 5.0, 6.0]))];
-        let figure = targets_over_time_figure(&targets, &history, None);
-        let names = |plot: &Plot| Vec::from_iter(plot.series.iter().map(|series| series.name.clone()));
-        assert_eq!(
-            figure.plots.iter().map(names).collect::<Vec<_>>(),
-            [vec!["x", "y"], vec!["force"]]
-        );
-        let last = &figure.plots[0].series[1].points[1];
-        assert_eq!([last.x, last.y], [0.5, 6.0]);
-        assert_eq!(figure.keys().len(), 3);
-    }
-
-    #[test]
-    fn intervals_limit_a_band_around_the_values() {
-        let target = Channel::new("force", None);
-        let history = [(0.0, Arc::from([1.0])), (0.5, Arc::from([4.0]))];
+    /// The sine of the place, decoded 0.1 too high, with a missing value at 3 and a gap before 5.
+    fn figure(samples: usize, seen: RangeInclusive<f64>) -> PlotFigure {
         let half_width = HalfWidth {
             constant: 0.5,
             by_answer: Vec::new(),
             samples: 100,
             effective_samples: 100.0,
         };
+        let mut actual = Array2::from_shape_fn((samples, 1), |(sample, _)| (0.01 * sample as f64).sin());
+        actual[[3, 0]] = f64::NAN;
+        let decoded = &actual + 0.1;
         let intervals = Intervals {
             targets: vec![Some(half_width)],
         };
-        let figure = targets_over_time_figure(&[target], &history, Some(&intervals));
-        let last = |series: &Series| series.points.last().map(|point| point.y);
-        let last = Vec::from_iter(figure.plots[0].series.iter().filter_map(last));
-        assert_eq!(last, [4.0, 3.5, 4.5]);
+        let series = TimeSeries {
+            targets: &[Channel::new("force", Some("N"))],
+            axis: PlotAxis::linear("time (s)"),
+            places: &Vec::from_iter((0..samples).map(|sample| sample as f64)),
+            gaps: &[5],
+            decoded: decoded.view(),
+            actual: Some(actual.view()),
+            intervals: Some(&intervals),
+        };
+        series.figure(0..1, &seen)
+    }
+
+    #[test]
+    fn a_missing_value_and_a_gap_break_the_lines_and_their_band() {
+        let figure = figure(9, 0.0..=8.0);
+        let [band, actual, decoded] = &figure.plots[0].series[..] else {
+            panic!("{figure:?}");
+        };
+        let lengths = |stretches: Vec<Vec<[f64; 2]>>| Vec::from_iter(stretches.iter().map(Vec::len));
+        // A single sample is no line.
+        for line in [actual, decoded] {
+            assert_eq!(lengths(figure.plots[0].stretches(line)), [3, 4]);
+        }
+        let ends = &figure.plots[0].bands(band)[0];
+        assert_eq!((ends.len(), ends[0]), (3, [0.0, -0.4, 0.6]));
+        assert_eq!((figure.plots[0].y.name.as_str(), figure.keys().len()), ("force (N)", 3));
+    }
+
+    #[test]
+    fn many_samples_are_drawn_by_their_extremes_and_all_of_them_from_near() {
+        let points = |figure: &PlotFigure| figure.plots[0].series[1].points.len();
+        let all = figure(100_000, 0.0..=1e5);
+        assert!((2000..4010).contains(&points(&all)), "{}", points(&all));
+        let [x, y] = all.plots[0].ranges();
+        assert!(*x.end() == 99_999.0 && *y.end() > 1.5, "{x:?}, {y:?}");
+        let near = figure(100_000, 500.0..=600.0);
+        // With the samples on either side, and the end of the line.
+        assert_eq!(points(&near), 104);
+        assert!(*near.plots[0].ranges()[0].end() < 610.0);
     }
 
     #[test]

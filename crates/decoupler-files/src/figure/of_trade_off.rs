@@ -131,6 +131,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         let (preset, kind, precision) = (alike[0].0.preset, alike[0].0.report.kind, alike[0].0.report.precision);
         let points = alike.iter().map(|&(point, is_on_front)| PlotPoint {
             label: is_on_front.then(|| named(point, None)),
+            item: level.points.iter().position(|other| std::ptr::eq(other, point)),
             ..PlotPoint::from(at(point)).noted(format!("{}\n{}", point_name(point), point_facts(point).join("\n")))
         });
         let name = kind.name(precision);
@@ -154,7 +155,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     }
     let error = match level.noise {
         Some(_) => "Z error (%)",
-        None => "mean absolute error (% of range)",
+        None => "MAE (% of range)",
     };
     let model_based = level.points.first().and_then(|point| point.model_based);
     let model_based = model_based.filter(|errors| !errors.is_rounding());

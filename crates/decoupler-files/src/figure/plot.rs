@@ -64,6 +64,8 @@ pub enum Form {
     Points,
     /// Bars of this width from 0 to each point.
     Bars(f64),
+    /// The area between the ends of the bars of the points.
+    Band,
     /// No points, but a line across the whole plot or a band, behind everything else.
     Across(LineAt),
 }
@@ -203,6 +205,14 @@ impl Plot {
         unbroken(places)
     }
 
+    /// Returns the stretches of a band: the place of each point on the horizontal axis, and those of both ends of its bar.
+    pub fn bands(&self, series: &Series) -> Vec<Vec<[f64; 3]>> {
+        unbroken(series.points.iter().map(|point| {
+            let [x, low] = self.place(point.x, point.bar?[0])?;
+            Some([x, low, self.y.place(point.bar?[1])?])
+        }))
+    }
+
     /// Returns the places of the ends of an error bar. Values without a place on a logarithmic axis are below its lower
     /// end.
     pub fn bar_ends(&self, ends: [f64; 2], y_range: &RangeInclusive<f64>) -> [f64; 2] {
@@ -215,7 +225,7 @@ impl Plot {
         for series in &self.series {
             let mut half = 0.0;
             match series.form {
-                Form::Points => {}
+                Form::Points | Form::Band => {}
                 Form::Bars(width) => {
                     half = 0.5 * width;
                     ys.push(0.0);
@@ -368,11 +378,13 @@ fn along(line: &[Vec2]) -> impl Iterator<Item = Vec2> {
     })
 }
 
-/// Plots side by side.
+/// Plots side by side, or one below the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotFigure {
-    /// From left to right.
+    /// From left to right, or from above.
     pub plots: Vec<Plot>,
+    /// Puts the plots one below the other, with one horizontal axis.
+    pub is_stacked: bool,
     /// Sentences about the figure.
     pub notes: Vec<String>,
 }
@@ -388,6 +400,7 @@ impl PlotFigure {
     pub fn new(plots: impl IntoIterator<Item = Plot>, notes: impl IntoIterator<Item = String>) -> Self {
         Self {
             plots: plots.into_iter().collect(),
+            is_stacked: false,
             notes: notes.into_iter().collect(),
         }
     }
@@ -555,7 +568,7 @@ mod tests {
         let plot = Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), all);
         let figure = PlotFigure {
             plots: vec![plot.clone(), plot],
-            notes: Vec::new(),
+            ..PlotFigure::default()
         };
         assert_eq!(
             figure.keys(),

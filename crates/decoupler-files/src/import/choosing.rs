@@ -55,7 +55,7 @@ impl Setup {
             let mut on_reading = |progress| on_progress(ChoosingProgress::Reading(progress));
             let (recording, test) = plan.recordings(folder, &mut watch(job, &mut on_reading))?;
             let raw = recording.with_memory(None)?;
-            let training = plan.division.training(&raw.set, test.is_some(), settings.seed)?;
+            let training = plan.division.divide(&raw.set, test.is_some(), settings.seed)?.training;
             Ok((raw, test, training))
         };
         let (mut raw, mut test, mut training) = read(&plan)?;

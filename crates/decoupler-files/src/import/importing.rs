@@ -5,7 +5,7 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, DatasetError, History, Memory},
-    problem::Problem,
+    problem::{Channel, Problem},
     text::{counted, in_one_line},
 };
 use ndarray::ArcArray2;
@@ -149,6 +149,7 @@ impl Recipe {
             group_names,
             lines,
             times,
+            clock: files.meanings.time.map(|id| files.channel(id)),
             rows: total,
             dropped,
             files: reports,
@@ -318,11 +319,13 @@ pub struct Recording {
     /// Index of the first sample of each data file, and the file.
     pub(super) parts: Vec<(usize, PathBuf)>,
     /// Name of each group of a group column.
-    pub(super) group_names: Vec<String>,
+    pub group_names: Vec<String>,
     /// Line of each sample in its file, from 1.
     pub lines: Vec<u64>,
     /// Time of each sample, if there is a time column.
     pub times: Option<Vec<f64>>,
+    /// Name and unit of the time column.
+    pub clock: Option<Channel>,
     /// Number of rows in the file, including dropped rows.
     pub rows: usize,
     /// Dropped rows, by reason.

@@ -6,11 +6,8 @@ mod side;
 
 use std::sync::Arc;
 
-use decoupler_files::figure::{
-    Figure, PlotFigure, compared_losses_figure,
-    surface::{Surface, SurfaceFigure},
-};
-use eframe::egui::{Align, Label, Layout, Rect, RichText, Sense, Ui, Vec2};
+use decoupler_files::figure::{Figure, PlotFigure, compared_losses_figure, surface::SurfaceFigure};
+use eframe::egui::{Align, Label, Layout, RichText, Sense, Ui};
 
 use self::{
     figures::{compared_table, figures_ui},
@@ -19,12 +16,12 @@ use self::{
 };
 use crate::window::{
     job::Wake,
-    plotting::{Pointer, plots_ui, titled_plots_ui},
+    plotting::{plots_ui, titled_plots_ui},
     shared::{
-        Effect, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, Status, View, colour_scale_ui,
-        follow_surface, target_choice_ui, view_mode_ui,
+        Effect, NetworkSource, PLACES, RightCard, RunList, RunsRequest, Shared, Shown, Status, View, surface_cards_ui,
+        surface_ui, target_choice_ui, view_mode_ui,
     },
-    surface_view::{ColourBar, SurfaceView},
+    surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
 };
@@ -77,23 +74,18 @@ impl View for CompareView {
         let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));
         let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
         let upper = upper.with_max_y(upper.max.y - gap);
-        let (cards, scale) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
-        let width = 0.5 * (cards.width() - gap);
-        let figure = self.figure(shared);
-        let mut surfaces = figure.surfaces.iter();
-        for place in 0..self.sides.len() {
-            let surface = (self.sides[place].snapshots() > 0).then(|| surfaces.next()).flatten();
-            let left = cards.left() + (width + gap) * place as f32;
-            let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
-            card_ui(ui, card, |ui| {
+        let (figure, look) = (self.figure(shared), shared.look);
+        surface_cards_ui(
+            ui,
+            (upper, PLACES.len()),
+            &figure,
+            look,
+            effects,
+            |ui, place, effects| {
                 self.head_ui(ui, shared, place, effects);
-                self.side_ui(ui, shared, place, surface, effects);
-            });
-        }
-        if let [colours, ..] = &figure.scales()[..] {
-            let slot = scale.shrink2(Vec2::new(0.0, space(4)));
-            colour_scale_ui(ui, slot, colours, &figure.note(), shared.look, effects);
-        }
+                self.side_ui(ui, shared, place, &figure, effects);
+            },
+        );
         let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
         let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
         card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
@@ -135,7 +127,11 @@ impl CompareView {
             let others = ids.filter(|id| !pinned.contains(&Some(*id)));
             let mut newest = Vec::from_iter(others.take(empty.clone().count()));
             newest.reverse();
-            effects.extend(empty.zip(newest).map(|(place, id)| Effect::PinRun(place, Some(id))));
+            effects.extend(
+                empty
+                    .zip(newest)
+                    .map(|(place, id)| Effect::ChangeRuns(RunsRequest::Pin(place, Some(id)))),
+            );
         }
         self.seen = count;
     }
@@ -191,31 +187,31 @@ impl CompareView {
         ui: &mut Ui,
         shared: &Shared,
         place: usize,
-        surface: Option<&Surface>,
+        figure: &SurfaceFigure,
         effects: &mut Vec<Effect>,
     ) {
         let (runs, letter) = (&shared.runs, PLACES[place]);
+        // Sides without a surface have none in the figure.
+        let before = self.sides[..place].iter().filter(|side| side.snapshots() > 0).count();
         let side = &mut self.sides[place];
+        let surface = figure.surfaces.get(before).filter(|_| side.snapshots() > 0);
         let chart = side.chart();
         match (&side.compared, surface) {
             (_, Some(surface)) => {
                 let view = SurfaceView {
                     label: &format!("Surface of {letter}"),
                     surface,
-                    marked_node: self.node,
-                    lit_nodes: &[],
-                    section: None,
-                    theme: Theme::of(ui),
+                    figure,
+                    is_touched: false,
                 };
-                let shown = view.show(ui, shared.look.camera);
                 // The node with the same number is highlighted on the other surface.
-                follow_surface(&shown, shared.look, &mut self.node, effects);
+                surface_ui(ui, view, shared.look, &mut self.node, effects);
             }
             (Some(Ok(compared)), None) => {
-                let targets = compared.test.recording().map_or(&[][..], |test| &test.problem.targets);
+                let targets = &compared.test.problem.targets;
                 target_choice_ui(ui, "Target", &format!("target of {letter}"), targets, &mut side.target);
                 if let Some(chart) = &chart {
-                    plots_ui(ui, &format!("Regression of {letter}"), chart, Pointer::Moves);
+                    plots_ui(ui, &format!("Regression of {letter}"), chart);
                 }
             }
             (Some(Err(reason)), None) => {

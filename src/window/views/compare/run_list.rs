@@ -9,9 +9,9 @@ use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Ro
 
 use super::figures::named_settings;
 use crate::window::{
-    shared::{Effect, PLACES, Shared},
+    shared::{Effect, PLACES, RunsRequest, Shared},
     theme::{space, type_size},
-    widgets::{dim_ui, ghost_button, scrolled_ui, section_heading_ui},
+    widgets::{dim_ui, scrolled_ui, section_heading_ui},
 };
 
 /// Shows the finished trainings, newest first; `removing` is the run whose removal awaits confirmation.
@@ -20,12 +20,10 @@ pub(super) fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u6
     scrolled_ui(ui, "runs", |ui| {
         section_heading_ui(ui, "Runs");
         if runs.workspace.runs.is_empty() {
-            dim_ui(ui, "Every finished training is kept here, with its network.");
-            ui.add_space(space(2));
-            let can_train = !shared.phase.is_busy();
-            if ui.add_enabled(can_train, ghost_button("Train a network now")).clicked() {
-                effects.extend([Effect::ShowTraining, Effect::Train]);
-            }
+            dim_ui(
+                ui,
+                "Every finished training is kept here, with its network: press Train in the Train view.",
+            );
         } else {
             dim_ui(ui, "Choose one as A and one as B to see them side by side.");
         }
@@ -57,7 +55,7 @@ pub(super) fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u6
 fn confirm_ui(ui: &mut Ui, run: &KeptRun, removing: &mut Option<u64>, effects: &mut Vec<Effect>) {
     ui.label("Remove this run?");
     if ui.button("Remove").clicked() {
-        effects.push(Effect::RemoveRun(run.id));
+        effects.push(Effect::ChangeRuns(RunsRequest::Remove(run.id)));
         *removing = None;
     }
     if ui.button("Keep").clicked() {
@@ -75,15 +73,20 @@ fn buttons_ui(ui: &mut Ui, shared: &Shared, run: &KeptRun, removing: &mut Option
         response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_pinned, format!("{name} as {letter}")));
         let hint = if is_pinned { "Hide" } else { "Show on this side" };
         if response.on_hover_text(hint).clicked() {
-            effects.push(Effect::PinRun(place, (!is_pinned).then_some(run.id)));
+            effects.push(Effect::ChangeRuns(RunsRequest::Pin(
+                place,
+                (!is_pinned).then_some(run.id),
+            )));
         }
     }
-    let can_take = !shared.phase.is_busy();
-    let take = ui.add_enabled(can_take, Button::new("Settings").min_size(size));
-    take.widget_info(|| WidgetInfo::labeled(Role::Button, can_take, format!("Use the settings of {name}")));
-    if take.on_hover_text("Uses its settings for the next training.").clicked() {
-        let setup = Box::new(run.summary.setup.clone());
-        effects.extend([Effect::TakeSetup(setup), Effect::ShowTraining]);
+    let can_open = !shared.phase.is_busy();
+    let open = ui.add_enabled(can_open, Button::new("Open").min_size(size));
+    open.widget_info(|| WidgetInfo::labeled(Role::Button, can_open, format!("Open {name}")));
+    if open
+        .on_hover_text("Shows it in the Train view, with its settings.")
+        .clicked()
+    {
+        effects.push(Effect::OpenRun(run.id));
     }
     let remove = ui.add(Button::new("Remove…").min_size(size));
     remove.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Remove {name}")));
@@ -107,7 +110,7 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
     if !edit.has_focus() && typed.is_some() {
         ui.data_mut(|data| data.remove::<String>(id));
         if name != run.name {
-            effects.push(Effect::RenameRun(run.id, name));
+            effects.push(Effect::ChangeRuns(RunsRequest::Rename(run.id, name)));
         }
     }
 }

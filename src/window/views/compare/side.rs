@@ -10,7 +10,7 @@ use ndarray::Array2;
 use crate::window::{
     job::{Background, Wake},
     shared::{LoadedRun, sentence},
-    test_view::{RecordedTest, TestSet, TestView},
+    test_view::TestView,
 };
 
 /// One side of the comparison.
@@ -83,7 +83,7 @@ impl Side {
         let Compared {
             test, answers, lines, ..
         } = self.ready().filter(|compared| compared.surfaces.is_none())?;
-        let (test, target) = (test.recording()?, self.target);
+        let target = self.target;
         let (line, channel) = lines.get(target).zip(test.problem.targets.get(target))?;
         let pair = |sample| (test.set.targets()[[sample, target]], answers[[sample, target]]);
         let samples: (usize, &dyn Fn(usize) -> (f64, f64)) = (test.set.samples(), &pair);
@@ -94,12 +94,12 @@ impl Side {
 /// Test set of a run with the answers of its network.
 #[derive(Debug)]
 pub(super) struct Compared {
-    pub(super) test: TestSet,
+    pub(super) test: TestView,
     /// Samples × targets.
     answers: Array2<f64>,
     /// The decoded surface of the snapshot and its error, where there is one through the targets.
     pub(super) surfaces: Option<[Surface; 2]>,
-    /// Regression lines of the targets of a recording.
+    /// Regression lines of the targets.
     lines: Vec<RegressionLine>,
 }
 
@@ -107,7 +107,7 @@ impl Compared {
     /// Simulates the test set of a run again, or reads it from the files of its recording.
     fn new(file: &NetworkFile, job: &Job<'_>) -> Result<Self, String> {
         let test = match &file.recorded {
-            None => TestSet::Array(TestView::draw(&file.settings).map_err(|error| error.to_string())?),
+            None => TestView::draw(&file.settings).map_err(|error| error.to_string())?,
             Some(recorded) => {
                 if let [missing, ..] = recorded.missing()[..] {
                     return Err(format!(
@@ -120,15 +120,13 @@ impl Compared {
                 let sets = sets.and_then(|sets| sets.check_saved(Some(recorded)).map(|()| sets));
                 let set = sets.map_err(|error| sentence(&error.to_string()))?.sets.test;
                 let (problem, order) = (Arc::new(file.problem.clone()), recorded.plan.test_order());
-                TestSet::Recording(RecordedTest::new(set, problem, order))
+                TestView::new(set, problem, order).map_err(|error| error.to_string())?
             }
         };
-        let answers = file.decoder().answers_to(test.set());
+        let answers = file.decoder().answers_to(&test.set);
         Ok(Self {
             surfaces: None,
-            lines: test
-                .recording()
-                .map_or_else(Vec::new, |test| test.charts(&answers).lines),
+            lines: test.charts(&answers).lines,
             test,
             answers,
         })

@@ -11,13 +11,13 @@ use decoupler_files::{
     },
     live::{SourcePlan, Tally},
 };
-use eframe::egui::{Align, Label, Layout, Rect, RichText, Sense, Slider, Ui, Vec2, WidgetInfo};
+use eframe::egui::{Align, Label, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo};
 
 use super::{LiveView, engine::Answered, view::command_ui};
 use crate::window::{
     plotting::{cells_ui, titled_plots_ui},
-    shared::{Command, Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
-    surface_view::{ColourBar, SurfaceView},
+    shared::{Command, Effect, Look, Shared, ViewKind, surface_cards_ui, surface_ui, view_mode_ui},
+    surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
         card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
@@ -124,48 +124,35 @@ fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, look: Look, effects
         return;
     };
     let figure = surface_figure(answer, *node, look);
-    let gap = space(2);
-    let (cards, scale) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
-    let count = figure.surfaces.len() as f32;
-    let width = (cards.width() - gap * (count - 1.0)) / count;
-    for (index, surface) in figure.surfaces.iter().enumerate() {
-        let left = cards.left() + (width + gap) * index as f32;
-        let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
-        card_ui(ui, card, |ui| {
-            ui.horizontal(|ui| {
-                ui.set_min_height(space(7));
-                ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
-                if index == 0 {
-                    let at_right = Layout::right_to_left(Align::Center);
-                    ui.with_layout(at_right, |ui| view_mode_ui(ui, look, effects));
-                }
-            });
-            let shown = SurfaceView {
-                label: &format!("Live {} surface", surface.title.to_lowercase()),
-                surface,
-                marked_node: *node,
-                lit_nodes: &[],
-                section: None,
-                theme: Theme::of(ui),
+    let cards = (rect, figure.surfaces.len());
+    surface_cards_ui(ui, cards, &figure, look, effects, |ui, index, effects| {
+        let surface = &figure.surfaces[index];
+        ui.horizontal(|ui| {
+            ui.set_min_height(space(7));
+            ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
+            if index == 0 {
+                let at_right = Layout::right_to_left(Align::Center);
+                ui.with_layout(at_right, |ui| view_mode_ui(ui, look, effects));
             }
-            .show(ui, look.camera);
-            follow_surface(&shown, look, node, effects);
-            shown.node_tooltip_ui(|ui, node| {
-                let name = answer.nodes.get(node).map_or("", String::as_str);
-                ui.label(RichText::new(name).font(semibold(type_size().note)));
-                let unit = if answer.readings.is_some() { " mm" } else { "" };
-                let values = answer.surfaces.iter().filter_map(|surface| {
-                    let value = format_number(surface.nodes.get(node)?.z);
-                    Some(format!("{} {value}{unit}", surface.title.to_lowercase()))
-                });
-                ui.label(RichText::new(Vec::from_iter(values).join(", ")).size(type_size().note));
-            });
         });
-    }
-    if let [colours, ..] = &figure.scales()[..] {
-        let slot = scale.shrink2(Vec2::new(0.0, space(4)));
-        colour_scale_ui(ui, slot, colours, &figure.note(), look, effects);
-    }
+        let view = SurfaceView {
+            label: &format!("Live {} surface", surface.title.to_lowercase()),
+            surface,
+            figure: &figure,
+            is_touched: false,
+        };
+        let shown = surface_ui(ui, view, look, node, effects);
+        shown.node_tooltip_ui(|ui, node| {
+            let name = answer.nodes.get(node).map_or("", String::as_str);
+            ui.label(RichText::new(name).font(semibold(type_size().note)));
+            let unit = if answer.readings.is_some() { " mm" } else { "" };
+            let values = answer.surfaces.iter().filter_map(|surface| {
+                let value = format_number(surface.nodes.get(node)?.z);
+                Some(format!("{} {value}{unit}", surface.title.to_lowercase()))
+            });
+            ui.label(RichText::new(Vec::from_iter(values).join(", ")).size(type_size().note));
+        });
+    });
 }
 
 /// Returns the surfaces of an answer on a common scale.
@@ -192,7 +179,7 @@ fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mu
         ui.add_space(space(4));
         if button.is_some_and(|button| ui.add(primary_button(button)).clicked()) {
             match button {
-                Some(TRAIN) => effects.extend([Effect::ShowTraining, Effect::Train]),
+                Some(TRAIN) => effects.extend([Effect::Show(ViewKind::Train), Effect::Train]),
                 _ => view.start(shared, effects),
             }
         }

@@ -21,17 +21,17 @@ use decoupler_core::{
 use decoupler_files::{
     export::{NetworkFile, format_number, format_percent},
     figure::{
-        HeatMap, PlotFigure, TargetSurface, readings_figure,
+        HeatMap, PlotAxis, PlotFigure, TargetSurface, TimeSeries, readings_figure,
         surface::{Quantity, Surface},
-        targets_over_time_figure,
     },
     live::{
         History, Input, LiveArray, Note, Recorded, ReplayState, Session, SessionEvent, SessionPlan, Tally, Watched,
     },
 };
 use glam::DVec3;
+use ndarray::Array2;
 
-use crate::window::{glossary, job::Report};
+use crate::window::{glossary, job::Report, plotting::MAX_TRACKS};
 
 /// Message to the thread.
 pub enum Request {
@@ -316,7 +316,22 @@ impl Screen {
         let Some(array) = &session.array else {
             let history = session.history.until(last.time_s);
             let intervals = self.network.intervals.as_ref();
-            answered.chart = Some(targets_over_time_figure(&problem.targets, &history, intervals));
+            let (places, shape) = (
+                Vec::from_iter(history.iter().map(|(time_s, _)| *time_s)),
+                problem.targets.len(),
+            );
+            let decoded = Array2::from_shape_fn((places.len(), shape), |(sample, target)| history[sample].1[target]);
+            let series = TimeSeries {
+                targets: &problem.targets,
+                axis: PlotAxis::linear("time (s)"),
+                gaps: &[],
+                decoded: decoded.view(),
+                actual: None,
+                intervals,
+                places: &places,
+            };
+            let all = places.first().copied().unwrap_or(0.0)..=places.last().copied().unwrap_or(1.0);
+            answered.chart = Some(series.figure(0..shape.min(MAX_TRACKS), &all));
             let outside = outside(session, problem.feature_count(), "target");
             answered.confidence = vec![outside, self.drift(session)];
             return answered;

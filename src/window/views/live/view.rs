@@ -385,7 +385,7 @@ impl View for LiveView {
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let count = if self.has_sensor(shared) { 4 } else { 2 };
-        for command in &COMMANDS[..count] {
+        for command in COMMANDS[..count].iter().rev() {
             command_ui(ui, command, self, shared, effects);
         }
     }

@@ -7,14 +7,14 @@ use decoupler_files::{
         surface::{Quantity, Surface, SurfaceFigure},
     },
 };
-use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder};
+use eframe::egui::{Align, Layout, RichText, Sense, Ui};
 
 use super::{Analysis, SensorView, view::RECORDED};
 use crate::window::{
     forms::meaning,
     plotting::titled_plots_ui,
-    shared::{Effect, Look, Shared, Shown, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
-    surface_view::{ColourBar, SurfaceView},
+    shared::{Effect, Look, Shared, Shown, SourceKind, surface_cards_ui, surface_ui, view_mode_ui},
+    surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, fact_ui, fields::capitalised, note_ui, scrolled_ui, section_heading_ui, segmented_ui},
 };
@@ -32,22 +32,12 @@ pub(super) fn analysis_ui(
     let gap = space(2);
     let lower_height = (0.44 * whole.height()).clamp(space(60), space(100));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-    let (left, right) = upper
-        .with_max_y(upper.max.y - gap)
-        .split_left_right_at_x(upper.center().x);
-    let cards = [
-        left.with_max_x(left.max.x - 0.5 * gap),
-        right.with_min_x(right.min.x + 0.5 * gap),
-    ];
     let figure = surfaces_figure(view, analysis, look);
-    let labels = ["Worst-seen deformation of each row", "Sensitivity of each node"];
+    let cards = (upper.with_max_y(upper.max.y - gap), figure.surfaces.len());
     let mut picked = (view.axis, view.node);
-    for ((surface, label), card) in figure.surfaces.iter().zip(labels).zip(cards) {
-        card_ui(ui, card, |ui| {
-            let slot = surface_ui(ui, surface, label, look, analysis, &mut picked, effects);
-            colour_scale_ui(ui, slot, surface, &figure.note(), look, effects);
-        });
-    }
+    surface_cards_ui(ui, cards, &figure, look, effects, |ui, place, effects| {
+        pattern_ui(ui, &figure, place, look, analysis, &mut picked, effects);
+    });
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));
     let (left, right) = lower.split_left_right_at_x(lower.right() - facts_width);
     card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
@@ -78,17 +68,17 @@ fn surfaces_figure(view: &SensorView, analysis: &Analysis, look: Look) -> Surfac
     }
 }
 
-/// Shows one of the two pictures; `axis` is the displayed axis, `node` the node marked on both. Returns the space for
-/// its colour scale.
-fn surface_ui(
+/// Shows one of the two pictures; `axis` is the displayed axis, `node` the node marked on both.
+fn pattern_ui(
     ui: &mut Ui,
-    surface: &Surface,
-    label: &str,
+    figure: &SurfaceFigure,
+    place: usize,
     look: Look,
     analysis: &Analysis,
     (axis, node): &mut (usize, Option<usize>),
     effects: &mut Vec<Effect>,
-) -> Rect {
+) {
+    let surface = &figure.surfaces[place];
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
@@ -102,21 +92,14 @@ fn surface_ui(
             _ => {}
         });
     });
-    let space_left = ui.available_rect_before_wrap();
-    let (picture, scale) = space_left.split_left_right_at_x(space_left.right() - ColourBar::WIDTH);
-    let mut slot = ui.new_child(UiBuilder::new().max_rect(picture));
     let view = SurfaceView {
-        label,
+        label: ["Worst-seen deformation of each row", "Sensitivity of each node"][place],
         surface,
-        marked_node: *node,
-        lit_nodes: &[],
-        section: None,
-        theme: Theme::of(ui),
+        figure,
+        is_touched: false,
     };
-    let shown = view.show(&mut slot, look.camera);
-    follow_surface(&shown, look, node, effects);
+    let shown = surface_ui(ui, view, look, node, effects);
     shown.node_tooltip_ui(|ui, node| node_ui(ui, analysis, surface, node));
-    scale
 }
 
 fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {

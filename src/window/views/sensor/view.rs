@@ -96,7 +96,6 @@ impl View for SensorView {
                 section_heading_ui(ui, "Array");
                 if let Some(simulation) = settings.simulation_mut() {
                     forms::array_ui(ui, simulation);
-                    section_heading_ui(ui, "Geometry");
                     forms::geometry_ui(ui, &mut simulation.sensor);
                 }
                 section_heading_ui(ui, "Scene");

@@ -3,9 +3,9 @@
 use std::{path::Path, sync::Arc};
 
 use decoupler_core::{
-    dataset::SplitBy,
+    dataset::{Division, SplitBy},
     evaluation::{
-        MAX_STARTS,
+        MAX_STARTS, RunSettings,
         experiments::{
             AxisKind, Cell, Experiment, ExperimentResults, Finished, PaperTable, TrialSamples, run_experiments,
             worker_threads,
@@ -23,18 +23,19 @@ use decoupler_files::{
     figure::{TradeOffLimits, experiment_figure},
     import::{Plan, Setup},
 };
-use eframe::egui::{ComboBox, Ui};
+use eframe::egui::Ui;
 
 use super::{
-    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label,
+    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList,
+    value_list::{label, write_percent},
 };
 use crate::window::{
     shared::Effect,
     theme::space,
     widgets::{
-        dim_ui,
-        fields::{count_ui, seed_ui},
-        section_heading_ui, segmented_ui,
+        dim_ui, explained_options_ui,
+        fields::{count_ui, list_ui, seed_ui},
+        section_heading_ui,
     },
 };
 
@@ -118,9 +119,12 @@ impl ExperimentForm {
     /// If the form is not a valid experiment.
     pub fn task(&self, train: &Result<Setup, String>) -> Result<Task, String> {
         let (experiment, setup) = self.experiment(train)?;
+        let mut results = ExperimentResults::new(experiment.clone());
+        write_percent(&mut results.experiment.axis);
+        results.experiment.second_axis.as_mut().map(write_percent);
         let outcome = ExperimentOutcome {
             heading: self.heading.clone(),
-            results: ExperimentResults::new(experiment.clone()),
+            results,
             plan: setup.plan().cloned(),
             kept_bytes: 0,
         };
@@ -149,10 +153,12 @@ impl ExperimentForm {
         let hint = "Values separated by commas";
         if self.is_sweep() {
             let settings = train.as_ref().map_or(self.template.base, |setup| *setup.settings());
-            let offered = Vec::from_iter(AxisKind::of_runs(&settings));
+            let offered = AxisKind::of_runs(&settings).map(|kind| (kind, label(kind), ""));
+            let offered = Vec::from_iter(offered);
             let names = [("Across", "Values across"), ("Down", "Values down")];
             for (axis, (name, values)) in self.axes.iter_mut().zip(names) {
-                axis_ui(ui, name, axis, &offered);
+                let picked = list_ui(ui, name, "Setting that is varied", &offered, axis.kind);
+                *axis = picked.map_or_else(|| axis.clone(), ValueList::new);
                 axis.ui(ui, Some(values), hint);
                 ui.add_space(space(1));
             }
@@ -186,33 +192,22 @@ impl ExperimentForm {
         count_ui(ui, "Folds", hint, &mut validation.folds, 2..=MAX_TRIALS);
         let hint = "Number of shuffles into new folds, for each seed.";
         count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MAX_TRIALS);
-        let units = [(SplitBy::Random, "By sample"), (SplitBy::Group, "By snapshot")];
-        let unit = segmented_ui(ui, "Unit of the folds", &units, validation.by, true);
+        let of_samples = "As in the paper: rows of one snapshot may be in both the training and the test folds.";
+        let of_snapshots = "Whole snapshots: no training sample is from the same moment as a test sample.";
+        let units = [
+            (SplitBy::Random, "By sample", of_samples),
+            (SplitBy::Group, "By snapshot", of_snapshots),
+        ];
+        let unit = explained_options_ui(ui, "Unit of the folds", &units, validation.by, true);
         validation.by = unit.unwrap_or(validation.by);
-        let meaning = match validation.by {
-            SplitBy::Random => "As in the paper: rows of one snapshot may be in both the training and the test folds.",
-            _ => "Whole snapshots: no training sample is from the same moment as a test sample.",
-        };
-        dim_ui(ui, meaning);
     }
 }
 
-/// Shows the choice of the setting of an axis.
-fn axis_ui(ui: &mut Ui, name: &str, axis: &mut ValueList, offered: &[AxisKind]) {
-    let name_label = ui.label(name);
-    let combo = ComboBox::from_id_salt(name)
-        .selected_text(label(axis.kind))
-        .width(ui.available_width());
-    let mut kind = axis.kind;
-    let shown = combo.show_ui(ui, |ui| {
-        for &option in offered {
-            ui.selectable_value(&mut kind, option, label(option));
-        }
-    });
-    shown.response.labelled_by(name_label.id);
-    if kind != axis.kind {
-        *axis = ValueList::new(kind);
-    }
+/// Returns the setup of a cell with these settings and this division of its recording, whose plan is given.
+pub fn setup_of(settings: RunSettings, division: Option<Division>, plan: Option<&Plan>) -> Setup {
+    let plan = plan.cloned().zip(division);
+    let plan = plan.map(|(plan, division)| Plan { division, ..plan });
+    Setup::of(settings, plan).expect("a cell has the source of its experiment")
 }
 
 /// Runs every trial on the samples of `setup`, and reports each as it finishes.
@@ -308,8 +303,9 @@ impl Outcome for ExperimentOutcome {
             .into_iter()
             .map(|text| Note::Line(Tone::Warning, text));
         let mut notes = Vec::from_iter(failures.chain(remarks));
-        if !notes.is_empty() {
-            notes.insert(0, Note::Heading("Remarks"));
+        if self.parts().0 == 0 && results.experiment.second_axis.is_none() {
+            let text = "Our figures appear next to the published ones as the trials finish.";
+            notes.push(Note::Line(Tone::Dim, text.to_owned()));
         }
         Report {
             headline: self.heading.clone(),
@@ -336,10 +332,7 @@ impl Outcome for ExperimentOutcome {
         if let Some(trial) = median {
             settings.seed = trial.seed;
         }
-        let plan = self.plan.clone().zip(cell.division);
-        let plan = plan.map(|(plan, division)| Plan { division, ..plan });
-        let setup = Setup::of(settings, plan).expect("a cell has the source of its experiment");
-        let setup = Box::new(setup);
+        let setup = Box::new(setup_of(settings, cell.division, self.plan.as_ref()));
         match median {
             Some(trial) if !trial.states.is_empty() => vec![Effect::TakeUp(setup, trial.states.clone())],
             Some(_) => vec![Effect::TakeSetup(setup), Effect::Train],
@@ -357,11 +350,7 @@ impl Outcome for ExperimentOutcome {
 
 #[cfg(test)]
 mod tests {
-    use decoupler_core::{
-        evaluation::{RunSettings, experiments::Axis},
-        scene::RowModel,
-        training::Method,
-    };
+    use decoupler_core::{evaluation::experiments::Axis, scene::RowModel, training::Method};
 
     use super::*;
 

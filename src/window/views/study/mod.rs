@@ -73,42 +73,21 @@ impl Topic {
         Self::Folds,
     ];
 
-    /// Returns its name, the verb on its button, and what it is about.
-    fn words(self) -> [&'static str; 3] {
+    /// Returns its name, and what it is about.
+    fn words(self) -> [&'static str; 2] {
         match self {
-            Self::Table(PaperTable::HiddenNodes) => [
-                "Table 1",
-                "Run",
-                "Errors of networks with different numbers of hidden nodes on the paper's array.",
-            ],
-            Self::Table(PaperTable::CrossValidation) => [
-                "Table 2",
-                "Run",
-                "Cross-validation of a large and a small dataset, shuffled in each repeat (the paper's Fig. 5).",
-            ],
-            Self::Table(PaperTable::ArrayScales) => [
-                "Table 3",
-                "Run",
-                "Errors on arrays of different scales, with 12 hidden nodes.",
-            ],
-            Self::Sweep => [
-                "Sweep",
-                "Run",
-                "Any two settings varied against each other, all others fixed.",
-            ],
+            Self::Table(table) => [["Table 1", "Table 2", "Table 3"][table as usize], table.title()],
+            Self::Sweep => ["Sweep", "Any two settings varied against each other, all others fixed."],
             Self::Speed => [
                 "Speed against accuracy",
-                "Measure",
                 "The error, the time for a frame and the training time of every decoder, on this machine.",
             ],
             Self::Readings => [
                 "What the readings determine",
-                "Analyse",
                 "How well the readings of a recording determine each target, measured on held-out samples in seconds.",
             ],
             Self::Folds => [
                 "Cross-validation",
-                "Cross-validate",
                 "Every sample of a recording tested by a network trained on the other folds: one training per fold.",
             ],
         }
@@ -219,10 +198,11 @@ enum StudyEvent {
     Problem(Arc<Problem>),
     /// A trial has finished or failed.
     Trial(Box<Finished>),
-    /// The samples of a run are ready, with the unit for which decoding is timed, "a sample", and the origin of recorded ones.
-    Samples(usize, String, Option<Box<Recorded>>),
-    /// A point of a run is measured, with the file of its network if it has one.
-    Point(usize, Box<TradeOffPoint>, Option<Arc<NetworkFile>>),
+    /// The samples of a run are ready, with their noise if they are simulated, the unit for which decoding is timed, "a
+    /// sample", and the origin of recorded ones.
+    Samples(Option<f64>, String, Option<Box<Recorded>>),
+    /// A point of a run is measured, with its setup, and the file of its network if it has one.
+    Point(Box<TradeOffPoint>, Box<Setup>, Option<Arc<NetworkFile>>),
     /// A decoder cannot be used with the samples of a run, with the reason.
     Refused(String),
     /// Results of work that has none before its end.

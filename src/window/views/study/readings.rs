@@ -11,7 +11,9 @@ use decoupler_core::{
     job::Job,
 };
 use decoupler_files::{
-    export::{Cell, describe_target, describe_warnings, error_table, format_below_one, format_duration},
+    export::{
+        Cell, describe_determinacy, describe_target, describe_warnings, error_table, format_below_one, format_duration,
+    },
     import::{Plan, Recording, Setup},
     machine::memory_budget,
 };
@@ -97,16 +99,7 @@ pub fn cross_validate(setup: &Setup, folds: usize, reporter: &Reporter) -> Resul
     let validated = validated.map_err(|error| error.to_string())?;
     let mut remarks = channel_remarks(&set, by, &problem.features(), &problem.targets);
     let determined = Determination::measure(&set, validated.network.view(), by);
-    remarks.extend(
-        problem
-            .targets
-            .iter()
-            .zip(&determined)
-            .map(|(target, determined)| match determined {
-                Ok(determined) => determined.sentence(&target.name, "the network explains"),
-                Err(cause) => format!("{}: {cause}", target.name),
-            }),
-    );
+    remarks.extend(describe_determinacy(&problem.targets, &determined, false));
     remarks.extend(ridge_remarks(&set, &validated, by, &problem.targets));
     let table = error_table(&ErrorTable::of_scores(&problem, &validated.scores(&set), None));
     // Its first columns are the target and the decoder.

@@ -4,17 +4,12 @@ use decoupler_files::{
     export::{Cell, Table},
     figure::{Figure, Ink, SequentialMap},
 };
-use eframe::egui::{
-    Color32, CursorIcon, Label, Pos2, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,
-};
+use eframe::egui::{Color32, CursorIcon, RichText, Stroke, Ui};
 
 use crate::window::{
-    plotting::{CellPointed, Pointer, colour, heat_map_ui, plots_ui},
-    theme::{Palette, Theme, semibold, type_size},
-    widgets::{
-        ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, placeholder_ui,
-        section_heading_ui,
-    },
+    plotting::{cells_ui, colour, plots_ui},
+    theme::{Palette, Theme, type_size},
+    widgets::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, section_heading_ui},
 };
 
 /// Results of a study, ready to be shown.
@@ -58,10 +53,6 @@ pub struct Row {
     pub dot: Option<Ink>,
     /// Tone of each cell.
     pub tones: Vec<Tone>,
-    /// What is known about it besides the cells.
-    pub facts: Vec<String>,
-    /// For each plot of the figure in which it answers to the pointer, the name of the quantity and its place.
-    pub places: Vec<(&'static str, [f64; 2])>,
 }
 
 /// Tone of a text.
@@ -100,8 +91,6 @@ pub enum Note {
     Heading(&'static str),
     /// A sentence.
     Line(Tone, String),
-    /// An item that is marked by a click.
-    Pick(usize, String),
 }
 
 /// What is shown of a report.
@@ -115,8 +104,8 @@ pub struct Look {
     pub sort: SortBy,
 }
 
-/// Shows the table. A click marks a row; returns the one opened by a double click.
-pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<usize> {
+/// Shows the table, whose rows are marked by a click.
+pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
     let palette = &Theme::of(ui).palette;
     let table = &page.table;
     let titles = Vec::from_iter(table.columns.iter().map(|column| column.title()));
@@ -129,9 +118,12 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<usize> {
             TableColumn::text(title)
         };
         let texts = texts.iter().map(|row| row[place].as_str());
-        column
-            .meaning(table.columns[place].meaning)
-            .width(ColumnWidth::of_longest(texts))
+        let column = column.meaning(table.columns[place].meaning);
+        match place {
+            // Its dots take room, too.
+            0 => column,
+            _ => column.width(ColumnWidth::of_longest(texts)),
+        }
     };
     let columns = Vec::from_iter(titles.iter().map(String::as_str).enumerate().map(column));
     // Texts are sorted by their places in the list of values.
@@ -162,79 +154,51 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<usize> {
             .dot(row.dot.map(|ink| colour(ink, palette)))
     };
     let view = TableView::new("study table", &columns).sorted(look.sort).clickable();
-    let (place, is_opened) = match view.show(ui, order.len(), row)? {
-        TableClick::Select(place) => (place, false),
-        TableClick::Open(place) => (place, true),
-        TableClick::Sort(sort) => {
-            look.sort = sort;
-            return None;
-        }
-    };
-    let item = page.rows[order[place]].item;
-    look.marked = Some(item);
-    is_opened.then_some(item)
+    match view.show(ui, order.len(), row) {
+        Some(TableClick::Select(place)) => look.marked = Some(page.rows[order[place]].item),
+        Some(TableClick::Sort(sort)) => look.sort = sort,
+        None => {}
+    }
 }
 
-/// Shows the figure. A click on a cell of a map marks it and a double click opens it; a click on a point opens it.
-pub fn figure_ui(ui: &mut Ui, page: &Page, look: &mut Look, colours: SequentialMap) -> Option<usize> {
-    if page.rows.is_empty() {
-        placeholder_ui(ui, "The points appear here as they are measured.");
-        return None;
-    }
-    match page.figure.as_ref()? {
-        Figure::HeatMap(map) => {
-            let columns = map.columns.len();
-            let marked = look.marked.map(|cell| [cell / columns, cell % columns]);
-            let map = (**map).clone().coloured(colours);
-            let ([row, column], pointed) = heat_map_ui(ui, &map, marked)?;
-            let cell = row * columns + column;
-            look.marked = Some(cell);
-            (pointed == CellPointed::Twice).then_some(cell)
+/// Shows the figure. A click on a point or on a cell of a map marks it.
+pub fn figure_ui(ui: &mut Ui, page: &Page, look: &mut Look, colours: SequentialMap) {
+    match &page.figure {
+        Some(Figure::HeatMap(map)) => {
+            let (map, columns) = ((**map).clone().coloured(colours), map.columns.len());
+            let marked = look.marked.map(|cell| ([cell / columns], [cell % columns]));
+            let marked = marked
+                .as_ref()
+                .map_or((&[][..], &[][..]), |(row, column)| (&row[..], &column[..]));
+            let marked = (marked.0, marked.1, Theme::of(ui).palette.text);
+            if let Some(([row, column], pointed)) = cells_ui(ui, "Map of the cells", &map, marked) {
+                if pointed.clicked() {
+                    look.marked = Some(row * columns + column);
+                }
+                let note = &map.notes[[row, column]];
+                pointed
+                    .on_hover_cursor(CursorIcon::PointingHand)
+                    .on_hover_text_at_pointer(note);
+            }
         }
-        Figure::Plots(plots) => {
-            let answers = page.rows.iter().any(|row| !row.places.is_empty());
-            let pointer = if answers { Pointer::Picks } else { Pointer::Moves };
-            let mut opened = None;
-            for (number, drawn) in plots_ui(ui, page.what, plots, pointer).iter().enumerate() {
-                let placed = page.rows.iter().filter_map(|row| {
-                    let (quantity, [x, y]) = *row.places.get(number)?;
-                    Some((row, quantity, drawn.position(x, y)?))
-                });
-                for (row, quantity, at) in placed {
-                    if point_ui(ui, row, quantity, at, look.marked == Some(row.item)).clicked() {
-                        (look.marked, opened) = (Some(row.item), Some(row.item));
-                    }
+        Some(Figure::Plots(plots)) => {
+            for drawn in plots_ui(ui, page.what, plots) {
+                look.marked = drawn.clicked.or(look.marked);
+                let points = drawn.plot.series.iter().flat_map(|series| &series.points);
+                let marked = points.filter(|point| point.item.is_some() && point.item == look.marked);
+                for at in marked.filter_map(|point| drawn.position(point.x, point.y)) {
+                    let ring = Stroke::new(1.6, Theme::of(ui).palette.text);
+                    ui.painter().circle_stroke(at, 8.0, ring);
                 }
             }
-            opened
         }
         // Studies have no surfaces.
-        Figure::Surfaces(_) => None,
+        Some(Figure::Surfaces(_)) | None => {}
     }
 }
 
-/// Shows the name and the facts of a point under the pointer, and a ring around it there and while it is marked.
-fn point_ui(ui: &mut Ui, point: &Row, quantity: &str, at: Pos2, is_marked: bool) -> Response {
-    let name = format!("{quantity}: {}", point.name);
-    let rect = Rect::from_center_size(at, Vec2::splat(14.0));
-    let response = ui.interact(rect, ui.scope_id().with(&name), Sense::click());
-    response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_marked, &name));
-    if is_marked || response.hovered() {
-        let ring = Stroke::new(1.6, Theme::of(ui).palette.text);
-        ui.painter().circle_stroke(at, 8.0, ring);
-    }
-    response.on_hover_cursor(CursorIcon::PointingHand).on_hover_ui(|ui| {
-        ui.spacing_mut().item_spacing.y = 1.0;
-        ui.label(RichText::new(&point.name).font(semibold(type_size().note)));
-        for fact in &point.facts {
-            ui.label(RichText::new(fact).size(type_size().note));
-        }
-        dim_ui(ui, "Click to open it in the Train view");
-    })
-}
-
-/// Shows the notes, and the facts of the marked item.
-pub fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
+/// Shows the notes.
+pub fn notes_ui(ui: &mut Ui, page: &Page) {
     let palette = Theme::of(ui).palette;
     for note in &page.notes {
         match note {
@@ -242,22 +206,6 @@ pub fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
             Note::Line(tone, text) => {
                 ui.label(RichText::new(text).size(type_size().note).color(tone.colour(&palette)));
             }
-            Note::Pick(item, text) => {
-                let shown = RichText::new(text).size(type_size().note).color(palette.accent);
-                let pick = ui.selectable_label(look.marked == Some(*item), shown);
-                if pick
-                    .on_hover_text("Click to mark it in the figure and the table.")
-                    .clicked()
-                {
-                    look.marked = Some(*item);
-                }
-            }
         }
-    }
-    let mut described = page.rows.iter().filter(|row| !row.facts.is_empty());
-    if let Some(point) = described.find(|row| look.marked == Some(row.item)) {
-        section_heading_ui(ui, "Marked point");
-        ui.add(Label::new(RichText::new(&point.name).font(semibold(type_size().note))).truncate());
-        dim_ui(ui, &format!("{}.", point.facts.join("; ")));
     }
 }

@@ -15,28 +15,32 @@ use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed, Simulation},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Preset, Run, RunSettings, TradeOffPoint, Workload, decoded_unit, experiments::AxisKind, measure_trade_off,
+        Preset, Run, RunSettings, TradeOffPoint, Workload, decoded_unit,
+        experiments::{AxisKind, Experiment},
+        measure_trade_off,
     },
     job::Job,
-    scene::{Noise, Scene},
-    sensor::SensorModel,
+    scene::Scene,
     text::counted,
-    training::{Method, StoppingRules},
+    training::StoppingRules,
 };
 use decoupler_files::{
     export::{NetworkFile, format_percent, trade_off_points, trade_off_summary},
-    figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure},
+    figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_name, trade_off_figure},
     import::{Recorded, Setup},
     machine::memory_budget,
 };
 use eframe::egui::Ui;
 
-use super::{NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
+use super::{
+    NamedTable, Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, experiment::setup_of,
+    value_list::noise_text,
+};
 use crate::window::{
     shared::{Effect, Exporting, NetworkSource, sentence},
     widgets::{
         fields::{count_ui, quantity_ui},
-        section_heading_ui, segmented_ui,
+        section_heading_ui,
     },
 };
 
@@ -50,18 +54,12 @@ pub struct SpeedForm {
     hidden: ValueList,
     /// Training methods of the networks of a recording.
     methods: ValueList,
-    /// Preset on which the settings of the networks of an array are based; `None` for both.
-    preset: Option<Preset>,
     /// Decoders, in the order of [`DecoderKind::ALL`].
     decoders: [bool; DecoderKind::ALL.len()],
-    /// True for trainings as in the presets or, for a recording, as in the Train view.
-    is_full: bool,
-    /// Maximum number of training samples of a quick look.
+    /// Maximum number of training samples of an array.
     samples: usize,
-    /// Maximum number of epochs of a quick look.
+    /// Maximum number of epochs.
     epochs: usize,
-    /// Number of samples on which the errors are measured.
-    test_samples: usize,
 }
 
 impl Default for SpeedForm {
@@ -71,15 +69,12 @@ impl Default for SpeedForm {
             values: values.to_owned(),
         };
         Self {
-            noises: list(AxisKind::Noise, "0, 1e-4, 1e-3, 1e-2"),
+            noises: list(AxisKind::Noise, "0.1"),
             hidden: list(AxisKind::Hidden, "6, 12"),
             methods: list(AxisKind::Method, "lm, br"),
-            preset: None,
             decoders: [true; DecoderKind::ALL.len()],
-            is_full: false,
             samples: 2000,
             epochs: 60,
-            test_samples: 100,
         }
     }
 }
@@ -91,33 +86,62 @@ impl SpeedForm {
     /// If the form is not a valid measurement.
     pub fn task(&self, base: &Setup, is_quiet: &Arc<AtomicBool>) -> Result<Task, String> {
         let plan = self.plan(base)?;
+        let (points, source) = (plan.points(), base.source_name());
         let outcome = SpeedOutcome {
-            plan: plan.clone(),
+            points,
+            source,
             ..SpeedOutcome::default()
         };
         let is_quiet = Arc::clone(is_quiet);
-        let size = counted(plan.points(), "point");
-        Ok(Task::new(size, outcome, move |reporter| {
+        Ok(Task::new(counted(points, "point"), outcome, move |reporter| {
             measure(&plan, &is_quiet, reporter)
         }))
     }
 
+    /// Returns the runs on the source of `base`: one for each noise and preset, or for each method. Decoders of a recording
+    /// that have no network do not depend on the method, so the first run measures them.
     fn plan(&self, base: &Setup) -> Result<SpeedPlan, String> {
-        let has_sensor = base.settings().simulation().is_some();
+        let is_array = base.plan().is_none();
         let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
-        let chosen = chosen.filter(|(kind, is_chosen)| *is_chosen && (has_sensor || !kind.needs_sensor()));
+        let chosen = chosen.filter(|(kind, is_chosen)| *is_chosen && (is_array || !kind.needs_sensor()));
         let decoders = Vec::from_iter(chosen.map(|(kind, _)| kind));
         if decoders.is_empty() {
             return Err("no decoder is chosen: choose at least one".to_owned());
         }
-        let hidden = self.hidden.numbers()?.into_iter();
-        let plan = SpeedPlan {
-            runs: match base.settings().simulation() {
-                Some(array) => self.runs_of_array(array, base.settings().seed, &decoders)?,
-                None => self.runs_of_recording(base, &decoders)?,
-            },
-            hidden: hidden.map(|hidden| hidden as usize).collect(),
+        let rows = if is_array { &self.noises } else { &self.methods };
+        let grid = Experiment {
+            base: *base.settings(),
+            recording: base.experiment_recording(),
+            axis: self.hidden.parse()?,
+            second_axis: Some(rows.parse()?),
+            seeds: 1,
+            cross_validation: None,
         };
+        grid.check().map_err(|error| error.to_string())?;
+        let cells = grid.cells();
+        let sizes = cells.iter().filter(|cell| cell.row == 0);
+        let mut plan = SpeedPlan {
+            runs: Vec::new(),
+            hidden: sizes.map(|cell| cell.settings.hidden).collect(),
+        };
+        for cell in cells.iter().filter(|cell| cell.column == 0) {
+            if let Some(array) = cell.settings.simulation() {
+                plan.runs.extend(Preset::ALL.map(|preset| PlannedRun {
+                    preset: Some(preset),
+                    setup: self.of_preset(preset, array, cell.settings.seed).into(),
+                    decoders: decoders.clone(),
+                }));
+            } else {
+                let settings = self.shortened(cell.settings);
+                let of_run = decoders.iter().copied();
+                let of_run = of_run.filter(|kind| cell.row == 0 || kind.needs_network());
+                plan.runs.push(PlannedRun {
+                    preset: None,
+                    setup: setup_of(settings, cell.division, base.plan()),
+                    decoders: of_run.collect(),
+                });
+            }
+        }
         match plan.points() {
             points if points > MAX_POINTS => Err(format!(
                 "{points} points are too many to display: give fewer values, at most {MAX_POINTS} points"
@@ -126,58 +150,26 @@ impl SpeedForm {
         }
     }
 
-    /// Returns a run for each noise and preset, with the sensor and the scene of `base`.
-    fn runs_of_array(
-        &self,
-        base: &Simulation,
-        seed: Seed,
-        decoders: &[DecoderKind],
-    ) -> Result<Vec<PlannedRun>, String> {
-        let mut runs = Vec::new();
-        for noise in self.noises.numbers()? {
-            let presets = Preset::ALL.into_iter();
-            let presets = presets.filter(|preset| self.preset.is_none_or(|only| only == *preset));
-            let scene = Scene {
-                noise: Noise {
-                    relative: noise,
-                    ..base.scene.noise
-                },
-                ..base.scene
-            };
-            scene.check().map_err(|error| error.to_string())?;
-            runs.extend(presets.map(|preset| PlannedRun {
-                noise: Some(noise),
-                preset: Some(preset),
-                setup: self.settings(base.sensor, scene, seed, preset).into(),
-                decoders: decoders.to_vec(),
-            }));
-        }
-        Ok(runs)
-    }
-
-    /// Returns the settings of a preset with this sensor and scene. The preset determines the rows that are read and the
-    /// inputs of the networks.
-    fn settings(&self, sensor: SensorModel, scene: Scene, seed: Seed, preset: Preset) -> RunSettings {
-        let of_preset = preset.simulation_in(scene.noise);
+    /// Returns the settings of a preset with the sensor and the scene of `array`. The preset determines the rows that are
+    /// read and the inputs of the networks.
+    fn of_preset(&self, preset: Preset, array: &Simulation, seed: Seed) -> RunSettings {
+        let of_preset = preset.simulation_in(array.scene.noise);
         let rows = of_preset.scene.rows;
         let source = Simulation {
-            sensor,
-            scene: Scene { rows, ..scene },
-            test_samples: self.test_samples,
+            sensor: array.sensor,
+            scene: Scene { rows, ..array.scene },
+            test_samples: array.test_samples,
             ..of_preset
         };
         self.shortened(RunSettings {
             source: source.into(),
             seed,
-            ..preset.settings_in(scene.noise)
+            ..preset.settings_in(array.scene.noise)
         })
     }
 
-    /// Returns the settings of a quick look, unless the form asks for full trainings.
+    /// Limits the training.
     fn shortened(&self, mut settings: RunSettings) -> RunSettings {
-        if self.is_full {
-            return settings;
-        }
         let epochs = &mut settings.training.stopping.epochs;
         *epochs = (*epochs).min(self.epochs);
         if let Some(array) = settings.simulation_mut() {
@@ -187,61 +179,16 @@ impl SpeedForm {
         settings
     }
 
-    /// Returns a run for each method, on the recording of `base`. Decoders without a network do not depend on the method, so
-    /// the first run measures them.
-    fn runs_of_recording(&self, base: &Setup, decoders: &[DecoderKind]) -> Result<Vec<PlannedRun>, String> {
-        let present = base.settings().training.method;
-        let mut methods = vec![present];
-        if decoders.iter().any(|kind| kind.needs_network()) {
-            let named = self.methods.parse()?.values.into_iter();
-            methods = named.flat_map(|name| Method::named(&name.to_string())).collect();
-        }
-        if methods.is_empty() {
-            return Err("no training method is given: give at least one, or leave out the networks".to_owned());
-        }
-        let mut runs: Vec<PlannedRun> = Vec::new();
-        for method in methods {
-            let mut settings = *base.settings();
-            // The method of the Train view keeps its settings.
-            if method.short_name() != present.short_name() {
-                settings.choose_method(method);
-            }
-            let settings = self.shortened(settings);
-            let mut plan = base.plan().cloned().ok_or("This is not a recording.")?;
-            // A share set by the user is kept.
-            if plan.division.validation_fraction == Some(base.settings().validation_fraction()) {
-                plan.division.validation_fraction = Some(settings.validation_fraction());
-            }
-            let of_run = decoders.iter().filter(|kind| runs.is_empty() || kind.needs_network());
-            let of_run = of_run.copied().collect();
-            runs.push(PlannedRun {
-                noise: None,
-                preset: None,
-                setup: Setup::recording(settings, plan),
-                decoders: of_run,
-            });
-        }
-        Ok(runs)
-    }
-
     /// Shows the fields; `is_array` for a simulated array.
     pub fn fields_ui(&mut self, ui: &mut Ui, is_array: bool) {
         if is_array {
-            let hint = "Noise of each reading (standard deviation), relative to the reading, separated by commas.";
+            let hint = "Noise of each reading (standard deviation), in percent of the reading, separated by commas.";
             self.noises.ui(ui, None, hint);
         }
         let hint = "Numbers of hidden nodes of the networks, separated by commas.";
         self.hidden.ui(ui, None, hint);
-        if is_array {
-            section_heading_ui(ui, "Presets");
-            let presets = [
-                (None, "Both"),
-                (Some(Preset::Paper), "Paper"),
-                (Some(Preset::Best), "Best"),
-            ];
-            self.preset = segmented_ui(ui, "Presets", &presets, self.preset, true).unwrap_or(self.preset);
-        } else {
-            let hint = "Training methods of the networks, separated by commas.";
+        if !is_array {
+            let hint = "Training methods of the networks.";
             self.methods.ui(ui, None, hint);
         }
         section_heading_ui(ui, "Decoders");
@@ -252,25 +199,18 @@ impl SpeedForm {
             }
         }
         section_heading_ui(ui, "Training");
-        self.training_ui(ui, is_array);
-    }
-
-    fn training_ui(&mut self, ui: &mut Ui, is_array: bool) {
-        let full = if is_array { "Full presets" } else { "As in Train view" };
-        let lengths = [(false, "Quick look"), (true, full)];
-        self.is_full = segmented_ui(ui, "Training length", &lengths, self.is_full, true).unwrap_or(self.is_full);
-        if !self.is_full {
-            if is_array {
-                let hint = "Largest number of training samples per network; a preset with fewer keeps its own number.";
-                count_ui(ui, "Maximum samples", hint, &mut self.samples, 1..=LARGEST_SAMPLES);
-            }
-            let epochs = 1..=StoppingRules::MAX_EPOCHS;
-            let hint = "Largest number of epochs per training.";
-            count_ui(ui, "Maximum epochs", hint, &mut self.epochs, epochs);
-        }
+        let hint =
+            "Largest number of epochs per training; a preset, or the Train view, with fewer keeps its own number.";
+        count_ui(
+            ui,
+            "Maximum epochs",
+            hint,
+            &mut self.epochs,
+            1..=StoppingRules::MAX_EPOCHS,
+        );
         if is_array {
-            let hint = "Number of samples on which the errors are measured.";
-            count_ui(ui, "Test samples", hint, &mut self.test_samples, 1..=LARGEST_SAMPLES);
+            let hint = "Largest number of training samples per network; a preset with fewer keeps its own number.";
+            count_ui(ui, "Maximum samples", hint, &mut self.samples, 1..=LARGEST_SAMPLES);
         }
     }
 }
@@ -286,7 +226,7 @@ pub fn limits_ui(ui: &mut Ui, limits: &mut TradeOffLimits) {
 }
 
 /// Plan of a measurement.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug)]
 struct SpeedPlan {
     /// Runs that fit the decoders, level by level.
     runs: Vec<PlannedRun>,
@@ -295,16 +235,22 @@ struct SpeedPlan {
 }
 
 /// A run that fits decoders.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct PlannedRun {
-    /// Relative noise of a reading, if it is simulated.
-    noise: Option<f64>,
     /// Preset from which its settings were derived, if any.
     preset: Option<Preset>,
     /// Setup, except for the hidden nodes.
     setup: Setup,
     /// Decoders to be measured.
     decoders: Vec<DecoderKind>,
+}
+
+impl PlannedRun {
+    /// Returns the relative noise of a reading, if it is simulated.
+    fn noise(&self) -> Option<f64> {
+        let simulation = self.setup.settings().simulation()?;
+        Some(simulation.scene.noise.relative)
+    }
 }
 
 impl SpeedPlan {
@@ -331,7 +277,7 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
         reporter.is_cancelled()
     };
     let job = Job::new(&is_cancelled);
-    for (number, run) in plan.runs.iter().enumerate() {
+    for run in &plan.runs {
         if run.setup.plan().is_none() {
             let workload = Workload::of_trade_off(run.setup.settings(), &plan.hidden, &run.decoders);
             let checked = workload.and_then(|workload| workload.check_memory(memory_budget()));
@@ -342,11 +288,15 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
         let sets = sets.map_err(|error| error.to_string())?;
         let recorded = sets.recorded();
         let unit = decoded_unit(&sets.sets.test);
-        reporter.send(StudyEvent::Samples(number, unit, recorded.cloned().map(Box::new)));
+        reporter.send(StudyEvent::Samples(run.noise(), unit, recorded.cloned().map(Box::new)));
         let on_point = |kind, point: Result<TradeOffPoint, _>, trained: Option<&Run>| {
             let file = trained.and_then(|trained| NetworkFile::from_run(trained, recorded).ok());
             reporter.send(match point {
-                Ok(point) => StudyEvent::Point(number, Box::new(point), file.map(Arc::new)),
+                Ok(mut point) => {
+                    point.preset = run.preset;
+                    let setup = run.setup.with_settings(point.settings);
+                    StudyEvent::Point(Box::new(point), Box::new(setup), file.map(Arc::new))
+                }
                 Err(error) => StudyEvent::Refused(format!("{kind}: {error}")),
             });
         };
@@ -360,120 +310,133 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
 /// Points measured so far.
 #[derive(Debug, Default)]
 struct SpeedOutcome {
-    plan: SpeedPlan,
+    /// Name of the source.
+    source: String,
+    /// Number of planned points.
+    points: usize,
     /// One for each noise level, or a single one for a recording.
-    levels: Vec<TradeOffLevel>,
-    /// The number of the run of each point of each level, and the file of its network if it has one.
-    origins: Vec<Vec<(usize, Option<Arc<NetworkFile>>)>>,
-    /// Decoders that cannot be used, each with its level and the reason.
-    refused: Vec<(usize, String)>,
+    levels: Vec<Level>,
     /// Unit that is decoded at a time, such as "a sample", once it is known.
     unit: String,
     /// Origin of the samples of a recording.
     recorded: Option<Box<Recorded>>,
 }
 
-impl SpeedOutcome {
-    /// Returns the setup with which a point was measured.
-    fn setup_of(&self, level: usize, point: usize) -> Box<Setup> {
-        let (run, _) = &self.origins[level][point];
-        let settings = self.levels[level].points[point].settings;
-        Box::new(self.plan.runs[*run].setup.with_settings(settings))
-    }
+/// Points of a level of noise.
+#[derive(Debug)]
+struct Level {
+    measured: TradeOffLevel,
+    /// Setup of each point, and the file of its network if it has one.
+    origins: Vec<(Box<Setup>, Option<Arc<NetworkFile>>)>,
+    /// Reasons why decoders cannot be used.
+    refused: Vec<String>,
+}
 
-    fn page(&self, number: usize, limits: &TradeOffLimits) -> Page {
-        let level = &self.levels[number];
-        let table = trade_off_summary(level);
+impl Level {
+    fn page(&self, limits: &TradeOffLimits) -> Page {
+        let table = trade_off_summary(&self.measured);
         Page {
-            name: level.noise.map_or_else(String::new, |noise| noise.to_string()),
+            name: self.measured.noise.map_or_else(String::new, noise_text),
             what: "Point",
-            rows: rows(level, table.columns.len()),
+            rows: rows(&self.measured, table.columns.len()),
             table,
-            figure: Some(trade_off_figure(level, limits).into()),
-            notes: self.notes(number, limits),
+            figure: Some(trade_off_figure(&self.measured, limits).into()),
+            notes: self.notes(limits),
         }
     }
 
-    fn notes(&self, number: usize, limits: &TradeOffLimits) -> Vec<Note> {
-        let level = &self.levels[number];
-        let refused = self.refused.iter().filter(|(of, _)| *of == number);
-        let mut notes = Vec::from_iter(refused.map(|(_, reason)| Note::Line(Tone::Warning, sentence(reason))));
-        notes.push(Note::Heading("Recommended decoders"));
+    fn notes(&self, limits: &TradeOffLimits) -> Vec<Note> {
+        let mut notes = vec![Note::Heading("Recommended decoders")];
         let questions = [
             ("Fastest", "No measured decoder is this accurate."),
             ("Most accurate", "No measured decoder is this fast."),
         ];
-        for ((question, none), answer) in questions.into_iter().zip(level.answers(limits)) {
+        for ((question, none), answer) in questions.into_iter().zip(self.measured.answers(limits)) {
             let Some(answer) = answer else {
                 notes.push(Note::Line(Tone::Dim, none.to_owned()));
                 continue;
             };
-            let point = &level.points[answer];
+            let point = &self.measured.points[answer];
             let (percent, time) = (point.report.errors.percent(), frame_time(point.report.frame_us));
             let (name, percent) = (point_name(point), format_percent(percent));
-            notes.push(Note::Pick(answer, format!("{question}: {name}, {percent}, {time}")));
+            notes.push(Note::Line(Tone::Own, format!("{question}: {name}, {percent}, {time}")));
         }
-        let hint = "Click a row of the table to mark its point, or a point of a chart to open it in the Train view.";
-        notes.push(Note::Line(Tone::Dim, hint.to_owned()));
+        // A remark is the same in both precisions.
+        let double = self
+            .measured
+            .points
+            .iter()
+            .filter(|point| point.report.precision == Precision::Double);
+        let remarks = double.flat_map(|point| {
+            let remarks = point.report.remarks.iter();
+            remarks.map(move |remark| format!("{}: {remark}", point_name(point)))
+        });
+        let remarks = remarks.chain(self.refused.iter().cloned());
+        notes.extend(remarks.map(|remark| Note::Line(Tone::Warning, sentence(&remark))));
         notes
     }
 }
 
 impl Outcome for SpeedOutcome {
     fn take(&mut self, event: StudyEvent) {
+        if let StudyEvent::Samples(noise, unit, recorded) = event {
+            if self.levels.last().is_none_or(|level| level.measured.noise != noise) {
+                let points = Vec::new();
+                self.levels.push(Level {
+                    measured: TradeOffLevel { noise, points },
+                    origins: Vec::new(),
+                    refused: Vec::new(),
+                });
+            }
+            (self.unit, self.recorded) = (unit, recorded);
+            return;
+        }
+        let Some(level) = self.levels.last_mut() else { return };
         match event {
-            StudyEvent::Samples(run, unit, recorded) => {
-                let noise = self.plan.runs[run].noise;
-                if self.levels.last().is_none_or(|level| level.noise != noise) {
-                    let points = Vec::new();
-                    self.levels.push(TradeOffLevel { noise, points });
-                    self.origins.push(Vec::new());
-                }
-                (self.unit, self.recorded) = (unit, recorded);
+            StudyEvent::Point(point, setup, file) => {
+                level.measured.points.push(*point);
+                level.origins.push((setup, file));
             }
-            StudyEvent::Point(run, point, file) => {
-                if let (Some(level), Some(origins)) = (self.levels.last_mut(), self.origins.last_mut()) {
-                    let preset = self.plan.runs[run].preset;
-                    level.points.push(TradeOffPoint { preset, ..*point });
-                    origins.push((run, file));
-                }
-            }
-            StudyEvent::Refused(reason) => self.refused.push((self.levels.len() - 1, reason)),
+            StudyEvent::Refused(reason) => level.refused.push(reason),
             _ => {}
         }
     }
 
     fn parts(&self) -> (usize, usize, &'static str) {
-        let measured: usize = self.levels.iter().map(|level| level.points.len()).sum();
-        (measured + self.refused.len(), self.plan.points(), "point")
+        let levels = self.levels.iter();
+        let done = levels.map(|level| level.origins.len() + level.refused.len()).sum();
+        (done, self.points, "point")
     }
 
     fn report(&self, limits: &TradeOffLimits) -> Report {
-        let source = self.plan.runs.first().map(|run| run.setup.source_name());
-        let (source, unit) = (source.unwrap_or_default(), &self.unit);
+        let (source, unit) = (&self.source, &self.unit);
         Report {
             headline: "Speed against accuracy".to_owned(),
             conditions: format!("{source}, one thread, median of many times of {unit}"),
-            pages: (0..self.levels.len()).map(|level| self.page(level, limits)).collect(),
+            pages: self.levels.iter().map(|level| level.page(limits)).collect(),
         }
     }
 
     fn open(&self, level: usize, point: usize) -> Vec<Effect> {
-        vec![Effect::TakeSetup(self.setup_of(level, point))]
+        vec![Effect::TakeSetup(self.levels[level].origins[point].0.clone())]
     }
 
     fn decoder(&self, level: usize, point: usize) -> Option<Exporting> {
-        let (_, file) = self.origins.get(level)?.get(point)?;
-        let of_point = &self.levels[level].points[point];
+        let Level { measured, origins, .. } = self.levels.get(level)?;
+        let (point, (setup, file)) = (measured.points.get(point)?, &origins[point]);
         let source = match file {
-            Some(file) => NetworkSource::Kept(point_name(of_point), Arc::clone(file)),
-            None => NetworkSource::Samples(self.setup_of(level, point), self.recorded.clone()),
+            Some(file) => NetworkSource::Kept(point_name(point), Arc::clone(file)),
+            None => NetworkSource::Samples(setup.clone(), self.recorded.clone()),
         };
-        Some(Exporting::decoder(of_point.report.kind, source))
+        Some(Exporting::decoder(point.report.kind, source))
     }
 
     fn tables(&self) -> Vec<NamedTable<'_>> {
-        vec![("All points", Box::new(|| trade_off_points(&self.levels)))]
+        let points = || {
+            let levels = self.levels.iter().map(|level| level.measured.clone());
+            trade_off_points(&Vec::from_iter(levels))
+        };
+        vec![("All points", Box::new(points))]
     }
 }
 
@@ -485,12 +448,6 @@ fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
     order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
     let row = |item: usize| {
         let point = &level.points[item];
-        let cost = |cost: TradeOffCost| cost.of(point).into();
-        let mut facts = point_facts(point);
-        facts.push(format!(
-            "at most {}",
-            counted(point.settings.training.stopping.epochs, "epoch")
-        ));
         let of_cost = |is_on_front| if is_on_front { Tone::Own } else { Tone::Usual };
         let mut tones = vec![Tone::Usual; columns];
         // The last columns are the costs.
@@ -501,11 +458,6 @@ fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
             meaning: "A blue time is on the Pareto front: no other point has as small an error in as little time.",
             dot: Some(Ink::of_decoder(point.report.kind)),
             tones,
-            facts,
-            places: vec![
-                ("Decoding", cost(TradeOffCost::Decoding)),
-                ("Training", cost(TradeOffCost::Training)),
-            ],
         }
     };
     order.into_iter().map(row).collect()
@@ -525,7 +477,7 @@ mod tests {
     /// The settings of the run of a preset at a noise.
     fn settings(plan: &SpeedPlan, noise: f64, preset: Preset) -> RunSettings {
         let mut runs = plan.runs.iter();
-        let run = runs.find(|run| (run.noise, run.preset) == (Some(noise), Some(preset)));
+        let run = runs.find(|run| (run.noise(), run.preset) == (Some(noise), Some(preset)));
         *run.unwrap().setup.settings()
     }
 
@@ -547,8 +499,8 @@ mod tests {
         base.simulation_mut().unwrap().scene.largest_compression = 0.1;
         base.simulation_mut().unwrap().sensor.geometry.height_mm = 4.0;
         let form = SpeedForm {
-            is_full: true,
-            preset: Some(Preset::Best),
+            samples: usize::MAX,
+            epochs: usize::MAX,
             ..SpeedForm::default()
         };
         let (settings, preset) = (settings(&plan(&form, base), 0.0, Preset::Best), Preset::Best.settings());
@@ -568,7 +520,7 @@ mod tests {
         let of = plan(&SpeedForm::default(), recording(&Plan::default()));
         // Mean, ridge, radial basis and fuzzy rules once; two methods with two sizes in two precisions.
         assert_eq!(of.points(), 4 + 2 * 2 * 2);
-        assert!(of.runs.iter().all(|run| run.noise.is_none()), "no noise is simulated");
+        assert!(of.runs.iter().all(|run| run.noise().is_none()), "no noise is simulated");
         let mut all = of.runs.iter().flat_map(|run| &run.decoders);
         assert!(all.all(|kind| !kind.needs_sensor()));
         let held_out = |plan: &SpeedPlan| {
@@ -596,7 +548,7 @@ mod tests {
             form.plan(&RunSettings::default().into()).unwrap_err()
         };
         assert!(error(|form| form.noises.values = "0, much".to_owned()).contains("'much' is not a number"));
-        assert!(error(|form| form.noises.values = "2".to_owned()).contains("relative noise"));
+        assert!(error(|form| form.noises.values = "200".to_owned()).contains("relative noise"));
         assert!(error(|form| form.noises.values = " , ".to_owned()).contains("there are no values"));
         assert!(error(|form| form.decoders.fill(false)).contains("choose at least one"));
         let many = error(|form| {

@@ -14,24 +14,19 @@ use decoupler_core::{evaluation::RunSettings, text::counted};
 use decoupler_files::{
     export::format_duration,
     figure::TradeOffLimits,
-    import::{Plan, Progress, Setup},
+    import::{Progress, Setup},
 };
 
 use eframe::egui::{Sense, Ui};
 
-use super::{
-    Form, Outcome, Report, StudyEvent, Task, Topic,
-    report::Look,
-    sweep_folder,
-    view::{exports, form_ui, invited_ui, report_ui},
-};
+use super::{Form, Outcome, Report, StudyEvent, Task, Topic, report::Look, sweep_folder};
 use crate::window::{
     job::{Background, Wake},
     shared::{
-        Command, Effect, Holdings, Matter, Notice, Offers, Phase, Shared, Shown, SourceKind, Status, Tone, Unfinished,
-        View, ViewKind,
+        Command, Effect, Holdings, Matter, Notice, Offers, Phase, RecordingDraft, Shared, Shown, SourceKind, Status,
+        Tone, Unfinished, View, ViewKind,
     },
-    widgets::{card_ui, scrolled_ui},
+    widgets::{card_ui, placeholder_ui, scrolled_ui},
 };
 
 /// The Study view.
@@ -58,7 +53,7 @@ pub struct StudyView {
 }
 
 /// Source and settings of the Train view.
-type Basis = (SourceKind, RunSettings, Result<Arc<Plan>, String>);
+type Basis = (SourceKind, RunSettings, RecordingDraft);
 
 /// Results of a topic.
 pub struct Study {
@@ -74,7 +69,7 @@ pub struct Study {
     reading: Option<Progress>,
     /// Estimated time of the remaining trials, once there is one.
     pub(super) time_left: Option<Duration>,
-    /// Time it took, once it has ended.
+    /// Time that the work took, once it has ended.
     took: Option<Duration>,
     /// True once a table of it has been saved.
     pub(super) is_saved: Arc<AtomicBool>,
@@ -118,19 +113,20 @@ impl StudyView {
         self.checked_on = None;
     }
 
-    /// Checks the form if it, or what the Train view has, has changed. Plans are not compared.
+    /// Checks the form if it, or what the Train view has, has changed.
     pub(super) fn check(&mut self, shared: &Shared) {
-        let settings = match shared.source {
-            SourceKind::Array => shared.draft,
-            SourceKind::Recording => shared.recording.settings,
-        };
-        let basis: Basis = (shared.source, settings, shared.recording.plan.clone());
-        let plan = |basis: &Basis| basis.2.as_ref().map(Arc::as_ptr).map_err(String::clone);
-        let is_same = |on: &Basis| (on.0, on.1, plan(on)) == (basis.0, basis.1, plan(&basis));
-        if self.checked_on.as_ref().is_some_and(is_same) {
+        let basis: Basis = (shared.source, shared.draft, shared.recording.clone());
+        if self.checked_on.as_ref() == Some(&basis) {
             return;
         }
         self.train = shared.setup();
+        let train = self.train.as_ref().ok().filter(|setup| setup.plan().is_some());
+        if let Some(source) = train.map(Setup::source_name) {
+            // Findings about another recording are not shown.
+            let is_its = |of: &Setup| of.source_name() == source;
+            self.studies
+                .retain(|_, study| study.took.is_none() || study.setup.as_ref().is_none_or(is_its));
+        }
         self.task = self.forms[&self.topic].task(&self.train, &self.is_quiet);
         if let Ok(Task { study, .. }) = &mut self.task {
             study.report = study.outcome.report(&self.limits);
@@ -138,13 +134,8 @@ impl StudyView {
         self.checked_on = Some(basis);
     }
 
-    /// Returns true while nothing is computed.
-    pub(super) fn is_idle(&self) -> bool {
-        self.running.is_none() || self.is_folder()
-    }
-
     pub(super) fn can_begin(&self) -> bool {
-        self.is_idle() && self.task.is_ok()
+        self.running.is_none() && self.task.is_ok()
     }
 
     /// Begins the task of the form.
@@ -161,9 +152,6 @@ impl StudyView {
     }
 
     fn start(&mut self, Task { study, run }: Task) {
-        if self.is_folder() {
-            self.cancel();
-        }
         let begun = Instant::now();
         self.studies.insert(self.topic, Study { begun, ..study });
         self.running = Some(self.topic);
@@ -178,11 +166,8 @@ impl StudyView {
         );
     }
 
-    /// Cancels the task under way; finished parts are kept. A sweep folder is closed.
+    /// Cancels the task under way; finished parts are kept.
     pub(super) fn cancel(&mut self) {
-        if self.is_folder() {
-            self.studies.remove(&Topic::Sweep);
-        }
         self.job.abandon();
         self.end();
     }
@@ -192,7 +177,7 @@ impl StudyView {
         self.refresh(topic);
         let study = self.studies.get_mut(&topic);
         match study.filter(|study| study.outcome.parts().0 > 0) {
-            Some(study) => study.took = Some(study.begun.elapsed()),
+            Some(study) => study.took = (!study.size.is_empty()).then(|| study.begun.elapsed()),
             None => drop(self.studies.remove(&topic)),
         }
     }
@@ -204,24 +189,9 @@ impl StudyView {
         }
     }
 
-    /// Returns true while a measurement of times waits for other work.
-    pub(super) fn is_waiting(&self) -> bool {
-        self.running == Some(Topic::Speed) && !self.is_quiet.load(Ordering::Relaxed)
-    }
-
-    /// Returns the results of the task under way.
-    pub(super) fn under_way(&self) -> Option<&Study> {
-        self.studies.get(&self.running?)
-    }
-
     /// Returns the results of the topic.
     pub(super) fn study(&self) -> Option<&Study> {
         self.studies.get(&self.topic)
-    }
-
-    /// Returns true while a sweep folder is shown.
-    pub(super) fn is_folder(&self) -> bool {
-        self.under_way().is_some_and(|study| study.size.is_empty())
     }
 
     /// Returns true if the results are of another recording or other settings than the Train view has now.
@@ -238,21 +208,42 @@ impl StudyView {
         report.filter(|report| !report.pages.is_empty())
     }
 
-    /// Returns how far the task under way is, as a share and in words.
-    pub(super) fn progress(&self) -> Option<(f32, String)> {
-        let (topic, study) = (self.running?, self.under_way()?);
-        if let Some(Progress { bytes, of }) = study.reading {
-            let share = of.filter(|of| *of > 0).map_or(0.0, |of| bytes as f32 / of as f32);
-            return Some((share, format!("Reading the files… {:.0} %", 100.0 * share)));
+    /// Returns the progress of the task under way, or how the study of the topic has ended.
+    fn status(&self) -> Status {
+        let under_way = |topic| Some((topic, self.studies.get(&topic)?));
+        let Some((topic, study)) = self.running.and_then(under_way) else {
+            let Some((study, took)) = self.study().and_then(|study| Some((study, study.took?))) else {
+                let text = if self.can_begin() {
+                    "Ready: press Run"
+                } else {
+                    "Not ready"
+                };
+                return Status::new(Tone::Calm, text);
+            };
+            let (done, all, _) = study.outcome.parts();
+            let (tone, ended) = match done < all {
+                true => (Tone::Warning, "ended early"),
+                false => (Tone::Good, "finished"),
+            };
+            let (name, took) = (self.topic.name(), format_duration(took));
+            return Status::new(tone, format!("{name} {ended}: {} in {took}", study.standing()));
+        };
+        if topic == Topic::Speed && !self.is_quiet.load(Ordering::Relaxed) {
+            let text = "Waiting: a training or other work is under way and would distort the times.";
+            return Status::new(Tone::Warning, text);
         }
-        Some(match study.outcome.parts() {
-            _ if self.is_folder() => (1.0, study.report.headline.clone()),
-            (.., "") => (0.0, format!("{}…", topic.name())),
-            (done, all, _) => {
-                let share = done as f32 / all.max(1) as f32;
-                (share, format!("{}: {}", topic.name(), study.standing()))
-            }
-        })
+        let (name, parts) = (topic.name(), study.outcome.parts());
+        let (text, done) = match (study.reading, parts) {
+            (Some(Progress { bytes, of }), _) => ("Reading the files…".to_owned(), of.map(|of| (bytes, of))),
+            (None, (.., "")) => (format!("{name}…"), None),
+            (None, (done, all, _)) => (format!("{name}: {}", study.standing()), Some((done as u64, all as u64))),
+        };
+        let mut status = Status::new(Tone::Busy, text);
+        status.progress = done.map(|(done, all)| ("Study", done as f32 / all.max(1) as f32));
+        if let Some(left) = study.time_left {
+            status = status.with_note(format!("about {} left", format_duration(left)));
+        }
+        status
     }
 }
 
@@ -288,7 +279,7 @@ impl View for StudyView {
             self.refresh(topic);
         }
         if let Ok(path) = self.folders.1.try_recv()
-            && self.is_idle()
+            && self.running.is_none()
         {
             self.choose(Topic::Sweep);
             self.start(sweep_folder::task(path));
@@ -312,54 +303,39 @@ impl View for StudyView {
             let is_unsaved = done == all && !part.is_empty() && !study.is_saved.load(Ordering::Relaxed);
             let standing = study.standing();
             let progress = match is_running {
-                true if self.is_folder() => return None,
                 true => standing,
                 false => is_unsaved.then(|| format!("{standing} finished, not exported as a table"))?,
             };
-            Some(Unfinished::new(topic.name(), progress))
+            // Watching a folder is no work.
+            (!progress.is_empty()).then(|| Unfinished::new(topic.name(), progress))
         };
         Holdings {
-            is_computing: !self.is_idle(),
+            is_computing: self.running.is_some(),
             unfinished: Topic::ALL.into_iter().filter_map(unfinished).collect(),
             files: Vec::new(),
         }
     }
 
     fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
-        exports(self, shared.look.colours)
+        self.exports(shared.look.colours)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        scrolled_ui(ui, "study form", |ui| form_ui(ui, self, effects));
+        scrolled_ui(ui, "study form", |ui| self.fields_ui(ui, effects));
         self.check(shared);
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         let whole = ui.available_rect_before_wrap();
-        let (mut look, mut is_wanted) = (self.look, false);
-        match self.displayed() {
-            Some(report) => is_wanted = report_ui(ui, self, report, &mut look, shared, effects),
-            None => card_ui(ui, whole, |ui| is_wanted = invited_ui(ui, self)),
+        let mut look = self.look;
+        match (self.displayed(), &self.task) {
+            (Some(report), _) => self.page_ui(ui, report, &mut look, shared, effects),
+            (None, Err(problem)) if self.running.is_none() => card_ui(ui, whole, |ui| placeholder_ui(ui, problem)),
+            _ => card_ui(ui, whole, |ui| placeholder_ui(ui, "The results appear here.")),
         }
         ui.allocate_rect(whole, Sense::hover());
         self.look = look;
-        if is_wanted {
-            self.begin(effects);
-        }
-        let ended = self.study().and_then(|study| Some((study, study.took?)));
-        Some(match (self.progress(), ended) {
-            (Some((_, text)), _) => Status::new(Tone::Busy, text),
-            (None, Some((study, took))) => {
-                let (done, all, _) = study.outcome.parts();
-                let (tone, ended) = match done < all {
-                    true => (Tone::Warning, "ended early"),
-                    false => (Tone::Good, "finished"),
-                };
-                let (name, took) = (self.topic.name(), format_duration(took));
-                Status::new(tone, format!("{name} {ended}: {} in {took}", study.standing()))
-            }
-            (None, None) => Status::new(Tone::Calm, format!("Ready: press {}", self.topic.words()[1])),
-        })
+        Some(self.status())
     }
 }
 

@@ -23,59 +23,41 @@ pub const FOLDER: FileWords = FileWords {
 
 /// Minimum time between two reads of the folder.
 const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
-/// Ratio of the pause between reads to the time of a read, so that a large folder does not keep the disk busy.
-const REST: u32 = 10;
 /// Interval at which a pause looks whether it is to end.
 const WAIT: Duration = Duration::from_millis(50);
 
 /// Returns the task that shows the folder until it is cancelled.
 pub fn task(path: PathBuf) -> Task {
-    let empty = report(&path, "Reading the folder…", Page::default());
-    Task::new(String::new(), Some(empty), move |reporter| {
-        watch(&path, reporter);
-        Ok(())
-    })
+    Task::new(String::new(), None::<Report>, move |reporter| watch(&path, reporter))
 }
 
 /// Reads the folder whenever its files change.
-fn watch(path: &Path, reporter: &Reporter) {
+///
+/// # Errors
+/// If it cannot be read.
+fn watch(path: &Path, reporter: &Reporter) -> Result<(), String> {
     let mut before = None;
     while !reporter.is_cancelled() {
         let begun = Instant::now();
         let files = SweepFiles::list(path).ok();
         if before.as_ref() != Some(&files) {
-            let report = match MergedSweep::read(&[path.to_owned()]) {
-                Ok(merged) => {
-                    let text = format!("{} begun. New trials appear here automatically.", merged.missing.len());
-                    report(path, &text, page(&merged))
-                }
-                Err(error) => {
-                    let notes = vec![Note::Line(Tone::Warning, error.to_string())];
-                    report(
-                        path,
-                        "",
-                        Page {
-                            notes,
-                            ..Page::default()
-                        },
-                    )
-                }
-            };
-            reporter.send(StudyEvent::Report(Box::new(report)));
+            let merged = MergedSweep::read(&[path.to_owned()]).map_err(|error| error.to_string())?;
+            let text = format!("{} begun. New trials appear here automatically.", merged.missing.len());
+            reporter.send(StudyEvent::Report(Box::new(report(path, text, page(&merged)))));
             before = Some(files);
         }
-        let pause = BETWEEN_LOOKS.max(REST * begun.elapsed());
-        while begun.elapsed() < pause && !reporter.is_cancelled() {
+        while begun.elapsed() < BETWEEN_LOOKS && !reporter.is_cancelled() {
             thread::sleep(WAIT);
         }
     }
+    Ok(())
 }
 
-fn report(path: &Path, conditions: &str, page: Page) -> Report {
+fn report(path: &Path, conditions: String, page: Page) -> Report {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     Report {
         headline: format!("Sweep folder {name}: {} finished", counted(page.rows.len(), "trial")),
-        conditions: conditions.to_owned(),
+        conditions,
         pages: vec![page],
     }
 }

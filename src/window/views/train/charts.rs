@@ -2,24 +2,24 @@
 //! offers a list of them, and one card draws the chosen one.
 
 use decoupler_files::figure::{
-    Decoded, Figure, HeatMap, Ink, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
-    hysteresis_figure, loss_figure, node_figure, pair_address, pair_sample, regression_figure, sample_figure,
-    training_state_figure,
+    Decoded, Figure, HeatMap, Ink, LineAt, LineStyle, Series, TimeSeries, histogram_figure, hysteresis_figure,
+    loss_figure, node_figure, pair_address, pair_sample, regression_figure, training_state_figure, value_pairs,
 };
-use eframe::egui::{Ui, UiBuilder};
+use eframe::egui::{Rect, Ui, UiBuilder};
 
 use super::{
     press::readings_ui,
     scrub::{self, scrub_bar_ui},
     section::{Along, section_bar_ui, section_of},
+    surfaces::{surface_figure, surfaces_ui},
     view::TrainView,
 };
 use crate::window::{
-    plotting::{Pointer, cells_ui, plots_ui},
+    plotting::{MAX_TRACKS, SeriesView, cells_ui, plots_ui},
     shared::{Command, Effect, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
-    test_view::{Positions, TargetCharts},
+    test_view::TestView,
     theme::{Theme, space},
-    widgets::{invitation_ui, tabs_ui},
+    widgets::{card_ui, dim_ui, placeholder_ui, tabs_ui},
 };
 
 /// A chart of the displayed result.
@@ -36,6 +36,8 @@ pub(super) struct Chart {
     items: Items,
     /// Shows what can be chosen in it.
     bar_ui: fn(&mut Ui, &mut TrainView, &Shared),
+    /// Shows its figure in a way of its own.
+    own_ui: Option<fn(&mut Ui, &mut TrainView, &Shared)>,
 }
 
 /// What the points of a chart are, which respond to the pointer.
@@ -56,6 +58,7 @@ const BARE: Chart = Chart {
     draw: |_, _| None,
     items: Items::None,
     bar_ui: |_, _, _| (),
+    own_ui: None,
 };
 
 const LOSS: Chart = Chart {
@@ -64,8 +67,11 @@ const LOSS: Chart = Chart {
     draw: |view, shared| {
         let (run, result) = trained(view, shared)?;
         let mut figure = loss_figure(run.outline.records(), &run.stages, result.best_epoch);
-        let past = view.scrub.epoch().map(|epoch| LineAt::X(epoch as f64));
-        add_line(&mut figure, "displayed network", past);
+        if let (Some(epoch), Some(plot)) = (view.scrub.epoch(), figure.plots.first_mut()) {
+            let at = LineAt::X(epoch as f64);
+            let line = Series::across("displayed network", at, Ink::Violet, LineStyle::Solid);
+            plot.series.push(line);
+        }
         Some(figure.into())
     },
     ..BARE
@@ -85,16 +91,10 @@ const HISTOGRAM: Chart = Chart {
     name: "Histogram",
     hint: "The distribution of the z errors in the test set appears here.",
     draw: |view, shared| {
-        let mut figure = histogram_figure(view.drawn.pairs()?, None, decoded(view, shared)?);
-        let name = match shared.recorded_test() {
-            None => "node under the pointer",
-            Some(_) => "displayed sample",
-        };
-        let lit = lit_value(view, shared).map(|[actual, decoded]| LineAt::X(decoded - actual));
-        add_line(&mut figure, name, lit);
-        Some(figure.into())
+        let (pairs, of) = pairs(view, shared)?;
+        Some(histogram_figure(&pairs, of).into())
     },
-    bar_ui: target_bar_ui,
+    bar_ui: lower_target_ui,
     ..BARE
 };
 
@@ -102,12 +102,10 @@ const REGRESSION: Chart = Chart {
     name: "Regression",
     hint: "Decoded against actual z of every node in the test set appears here.",
     draw: |view, shared| {
-        let pairs = view.drawn.pairs()?;
-        let line = match shared.recorded_test() {
-            None => RegressionLine::of(pairs.iter().copied()),
-            Some(test) => *target_charts(view, shared)?.lines.get(view.target_of(test))?,
-        };
-        let figure = regression_figure((pairs.len(), &|pair| pairs[pair]), &line, decoded(view, shared)?);
+        let (pairs, of) = pairs(view, shared)?;
+        let line = view.target_of(shared.test()?).unwrap_or(0);
+        let line = view.result(shared)?.charts.lines.get(line)?;
+        let figure = regression_figure((pairs.len(), &|pair| pairs[pair]), line, of);
         Some(figure.lighting(|_| false, lit_value(view, shared).as_slice()).into())
     },
     items: Items::Values,
@@ -119,44 +117,44 @@ const HYSTERESIS: Chart = Chart {
     name: "Hysteresis",
     hint: "Mean decoded against actual values appear here, loading and unloading apart, for a target that rises and falls.",
     is_offered: |shared| {
-        let charts = shared.result().and_then(|result| result.charts.as_ref());
-        charts.is_some_and(|charts| charts.loops.iter().any(Option::is_some))
+        let result = shared.result();
+        result.is_some_and(|result| result.charts.loops.iter().any(Option::is_some))
     },
     draw: |view, shared| {
-        let test = shared.recorded_test()?;
-        let target = view.target_of(test);
-        let found = target_charts(view, shared)?.loops.get(target)?.as_ref()?;
+        let test = shared.test()?;
+        let target = view.target_of(test)?;
+        let found = view.result(shared)?.charts.loops.get(target)?.as_ref()?;
         Some(hysteresis_figure(found, test.problem.targets.get(target)?).into())
     },
     bar_ui: target_bar_ui,
     ..BARE
 };
 
-/// All targets of the sample, actual and decoded. Without surfaces it takes their place.
-pub(super) const SAMPLE: Chart = Chart {
-    name: "Sample",
-    is_offered: has_target_surface,
+/// Actual and decoded values of each target of a recording over time.
+pub(super) const SERIES: Chart = Chart {
+    name: "Over time",
+    hint: "Actual and decoded values of each target in the test set appear here, over time.",
     draw: |view, shared| {
-        let (test, result) = (shared.recorded_test()?, view.result(shared)?);
-        let values = |values: ndarray::ArrayView2<'_, f64>| {
-            let is_there = view.snapshot < values.nrows();
-            is_there.then(|| values.row(view.snapshot).to_vec())
-        };
-        let [actual, decoded] = [values(test.set.targets())?, values(result.answers.view())?];
-        Some(sample_figure(&test.problem.targets, &actual, &decoded, &test.ranges).into())
+        let series = series(shared.test()?, view.result(shared)?);
+        Some(view.series.figure(&series, MAX_TRACKS, Some(view.snapshot)).into())
     },
-    items: Items::Nodes,
+    own_ui: Some(series_ui),
+    ..BARE
+};
+
+/// Surfaces through the targets of a recording; always there for an array.
+pub(super) const SURFACES: Chart = Chart {
+    name: "Surfaces",
+    is_offered: |shared| shared.test().is_some_and(|test| test.through().is_some()),
+    draw: |view, shared| Some(surface_figure(view, shared).into()),
     ..BARE
 };
 
 const ERROR_MAP: Chart = Chart {
     name: "Error map",
-    is_offered: |shared| {
-        let charts = shared.result().and_then(|result| result.charts.as_ref());
-        charts.is_some_and(|charts| charts.error_map.is_some())
-    },
+    is_offered: |shared| shared.result().is_some_and(|result| result.charts.error_map.is_some()),
     draw: |view, shared| {
-        let map = target_charts(view, shared)?.error_map.as_ref()?;
+        let map = view.result(shared)?.charts.error_map.as_ref()?;
         Some(HeatMap::clone(map).coloured(shared.look.colours).into())
     },
     ..BARE
@@ -166,10 +164,11 @@ const ERROR_MAP: Chart = Chart {
 pub(super) const NODES: Chart = Chart {
     name: "Nodes",
     draw: |view, shared| {
-        let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
+        let nodes_per_row = shared.skin()?.sensor.scale.nodes_per_row();
         let drawing = view.drawing()?;
         let decoded_mm = drawing.decoded.as_ref().map(|[decoded, _]| &*decoded.nodes);
-        let bars_mm = view.has_error_bars.then(|| view.drawn.spread_mm()).flatten();
+        let bars_mm = view.result(shared).filter(|_| view.has_error_bars);
+        let bars_mm = bars_mm.map(|result| &*result.charts.spread_mm);
         Some(node_figure(&drawing.actual.nodes, decoded_mm, bars_mm, nodes_per_row).into())
     },
     items: Items::Nodes,
@@ -184,11 +183,11 @@ pub(super) const NODES: Chart = Chart {
 
 pub(super) const SECTION: Chart = Chart {
     name: "Section",
-    draw: |view, shared| Some(section_of(&view.section, shared.test()?, view.drawing()?, shared.look).into()),
+    draw: |view, shared| Some(section_of(&view.section, shared.skin()?, view.drawing()?, shared.look).into()),
     items: Items::Nodes,
     bar_ui: |ui, view, shared| {
-        if let Some(test) = shared.test() {
-            section_bar_ui(ui, &mut view.section, test);
+        if let Some(skin) = shared.skin() {
+            section_bar_ui(ui, &mut view.section, skin);
         }
     },
     ..BARE
@@ -197,45 +196,127 @@ pub(super) const SECTION: Chart = Chart {
 /// The readings, if there is no room for their own card.
 const READINGS: Chart = Chart {
     name: "Readings",
+    own_ui: Some(readings_of_view_ui),
     ..BARE
 };
 
+/// Charts below the surfaces of an array.
 const OF_ARRAY: [Chart; 7] = [LOSS, TRAINING_STATE, HISTOGRAM, REGRESSION, NODES, SECTION, READINGS];
 
-const OF_RECORDING: [Chart; 7] = [
+/// Charts of the answers for a recording, and of its training below.
+const OF_ANSWERS: [Chart; 5] = [
+    SERIES,
+    SURFACES,
+    Chart {
+        hint: "Decoded against actual values of each target in the test set appear here.",
+        ..REGRESSION
+    },
+    HYSTERESIS,
+    ERROR_MAP,
+];
+const OF_TRAINING: [Chart; 3] = [
     LOSS,
     TRAINING_STATE,
     Chart {
         hint: "The distribution of the errors of each target in the test set appears here.",
         ..HISTOGRAM
     },
-    Chart {
-        hint: "Decoded against actual values of each target in the test set appear here.",
-        ..REGRESSION
-    },
-    HYSTERESIS,
-    SAMPLE,
-    ERROR_MAP,
 ];
 
-/// Returns the charts of the current source, including the readings unless they have their own card.
+/// Returns the charts of the current source below the surfaces, including the readings unless they have their own card.
 fn charts(shared: &Shared, has_readings: bool) -> impl Iterator<Item = &'static Chart> {
     let all: &'static [Chart] = match shared.source {
         SourceKind::Array => &OF_ARRAY,
-        SourceKind::Recording => &OF_RECORDING,
+        SourceKind::Recording => &OF_TRAINING,
     };
-    let is_offered = move |chart: &&Chart| chart.name != READINGS.name || has_readings;
-    all.iter().filter(is_offered).filter(|chart| (chart.is_offered)(shared))
+    all.iter()
+        .filter(move |chart| chart.name != READINGS.name || has_readings)
 }
 
-/// Returns the name and the figure of the displayed chart; no figure before there is anything to draw.
-pub(super) fn shown_chart(view: &TrainView, shared: &Shared) -> (&'static str, Option<Figure>) {
-    let chart = charts(shared, true).find(|chart| chart.name == view.tab);
-    let chart = chart.unwrap_or(&LOSS);
-    (chart.name, chart.figure(view, shared))
+/// Returns the charts of the answers for a recording, in the card above.
+fn upper_charts(shared: &Shared) -> impl Iterator<Item = &'static Chart> {
+    OF_ANSWERS.iter().filter(|chart| (chart.is_offered)(shared))
+}
+
+/// Returns the displayed chart of the answers for a recording.
+pub(super) fn upper_chart(view: &TrainView, shared: &Shared) -> &'static Chart {
+    upper_charts(shared)
+        .find(|chart| chart.name == view.upper)
+        .unwrap_or(&SERIES)
+}
+
+/// Returns the displayed chart below.
+pub(super) fn lower_chart(view: &TrainView, shared: &Shared) -> &'static Chart {
+    charts(shared, true)
+        .find(|chart| chart.name == view.tab)
+        .unwrap_or(&LOSS)
+}
+
+/// Returns the values of the test samples of a recording over time.
+fn series<'a>(test: &'a TestView, result: &'a RunResult) -> TimeSeries<'a> {
+    TimeSeries {
+        targets: &test.problem.targets,
+        axis: test.timeline.axis.clone(),
+        places: &test.timeline.places,
+        gaps: &test.timeline.gaps,
+        decoded: result.answers.view(),
+        actual: Some(test.set.targets()),
+        intervals: result.intervals.as_ref(),
+    }
+}
+
+/// The answers for a recording: its charts in one card, or surfaces below the choice of the chart.
+pub(super) fn answers_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let chart = upper_chart(view, shared);
+    let tabs = Vec::from_iter(upper_charts(shared).map(|chart| (chart.name, chart.name)));
+    let show = |ui: &mut Ui, view: &mut TrainView| {
+        view.upper = tabs_ui(ui, "Answers", &tabs, chart.name).unwrap_or(chart.name);
+    };
+    if chart.name == SURFACES.name {
+        let (head, cards) = rect.split_top_bottom_at_y(rect.top() + space(12));
+        card_ui(ui, head, |ui| show(ui, view));
+        return surfaces_ui(ui, cards.with_min_y(cards.top() + space(2)), view, shared, effects);
+    }
+    card_ui(ui, rect, |ui| {
+        show(ui, view);
+        if let Some(Err(reason)) = shared.test().and_then(|test| test.through.as_ref()) {
+            dim_ui(
+                ui,
+                &format!("No surface goes through the positions of the targets: {reason}."),
+            );
+        }
+        chart.show(ui, view, shared);
+    });
+}
+
+/// The values over time; a click goes to a sample.
+fn series_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    let targets = shared.test().map_or(0, |test| test.problem.targets.len());
+    if targets > SeriesView::tracks(ui) {
+        target_bar_ui(ui, view, shared);
+        view.series.first = view.target;
+    }
+    let (Some(test), Some(result)) = (shared.test(), view.scrub.shown(shared)) else {
+        return placeholder_ui(ui, SERIES.hint);
+    };
+    let (series, name) = (series(test, result), |sample| test.timeline.name(sample));
+    let clicked = view.series.show(ui, "series", &series, Some(view.snapshot), name);
+    view.snapshot = clicked.unwrap_or(view.snapshot);
 }
 
 impl Chart {
+    /// Shows it in the remaining space.
+    fn show(&self, ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+        (self.bar_ui)(ui, view, shared);
+        if let Some(own_ui) = self.own_ui {
+            own_ui(ui, view, shared);
+        } else if let Some(figure) = self.figure(view, shared) {
+            self.figure_ui(ui, &figure, view, shared);
+        } else {
+            placeholder_ui(ui, self.hint);
+        }
+    }
+
     /// Returns its figure with the lit items highlighted.
     pub(super) fn figure(&self, view: &TrainView, shared: &Shared) -> Option<Figure> {
         let figure = (self.draw)(view, shared)?;
@@ -250,7 +331,7 @@ impl Chart {
     }
 
     /// Shows its figure in the remaining space. Lights up the item under the pointer, and handles a click there.
-    pub(super) fn figure_ui(&self, ui: &mut Ui, figure: &Figure, view: &mut TrainView, shared: &Shared) {
+    fn figure_ui(&self, ui: &mut Ui, figure: &Figure, view: &mut TrainView, shared: &Shared) {
         let plots = match figure {
             Figure::Plots(plots) => plots,
             Figure::HeatMap(map) => {
@@ -263,7 +344,7 @@ impl Chart {
             Figure::Surfaces(_) => return,
         };
         // Each chart is zoomed by itself.
-        let drawn = plots_ui(ui, self.name, plots, Pointer::Moves);
+        let drawn = plots_ui(ui, self.name, plots);
         let Some(plot) = drawn.iter().find(|plot| plot.has_pointer) else {
             return;
         };
@@ -288,40 +369,33 @@ fn trained<'a>(view: &'a TrainView, shared: &'a Shared) -> Option<(&'a RunView, 
     shared.shown_run().zip(view.result(shared))
 }
 
-fn target_charts<'a>(view: &'a TrainView, shared: &'a Shared) -> Option<&'a TargetCharts> {
-    view.result(shared)?.charts.as_deref()
-}
-
-/// What the values of the test set are: z of the nodes, or those of the displayed target.
-fn decoded<'a>(view: &TrainView, shared: &'a Shared) -> Option<Decoded<'a>> {
-    match shared.recorded_test() {
-        None => Some(Decoded::Nodes),
-        Some(test) => Some(Decoded::Target(test.problem.targets.get(view.target_of(test))?)),
-    }
-}
-
-fn add_line(figure: &mut PlotFigure, name: &str, at: Option<LineAt>) {
-    if let (Some(at), Some(plot)) = (at, figure.plots.first_mut()) {
-        plot.series
-            .push(Series::across(name, at, Ink::Orange, LineStyle::Solid));
-    }
+/// Returns actual and decoded values of the test set, and what they are: z of the nodes, or those of the displayed target.
+fn pairs<'a>(view: &TrainView, shared: &'a Shared) -> Option<(Vec<(f64, f64)>, Decoded<'a>)> {
+    let (test, result) = (shared.test()?, view.result(shared)?);
+    let target = view.target_of(test);
+    let of = match target {
+        None => Decoded::Nodes,
+        Some(target) => Decoded::Target(test.problem.targets.get(target)?),
+    };
+    Some((value_pairs(&test.set, &result.answers, target), of))
 }
 
 /// Returns the snapshot and the node of one of the values of the test set; for a recording the sample and the target.
 fn place_of_value(view: &TrainView, shared: &Shared, value: usize) -> Option<(usize, Option<usize>)> {
-    if let Some(test) = shared.test() {
+    let test = shared.test()?;
+    if let Some(skin) = &test.skin {
         let address = pair_address(&test.set, value)?;
-        return Some((address.snapshot, test.node(address)));
+        return Some((address.snapshot, skin.node(address)));
     }
-    let test = shared.recorded_test()?;
-    Some((pair_sample(&test.set, value)?, Some(view.target_of(test))))
+    Some((pair_sample(&test.set, value)?, view.target_of(test)))
 }
 
 /// Returns the actual and decoded value that are highlighted among those of the test set: those of the lit node, or for a
 /// recording those of the displayed target and sample.
 fn lit_value(view: &TrainView, shared: &Shared) -> Option<[f64; 2]> {
-    if let Some(test) = shared.recorded_test() {
-        let at = [view.snapshot, view.target_of(test)];
+    let test = shared.test()?;
+    if let Some(target) = view.target_of(test) {
+        let at = [view.snapshot, target];
         let answers = &view.result(shared)?.answers;
         return Some([*test.set.targets().get(at)?, *answers.get(at)?]);
     }
@@ -332,49 +406,45 @@ fn lit_value(view: &TrainView, shared: &Shared) -> Option<[f64; 2]> {
 
 /// Returns the nodes of the row-wire that is pointed at, which are lit together.
 pub(super) fn lit_nodes(view: &TrainView, shared: &Shared) -> Vec<usize> {
-    let per_row = shared.test().map_or(0, |test| test.sensor.scale.nodes_per_row());
+    let per_row = shared.skin().map_or(0, |skin| skin.sensor.scale.nodes_per_row());
     let row = view.lights.row.into_iter();
     row.flat_map(|row| row * per_row..(row + 1) * per_row).collect()
 }
 
-/// Returns true if a surface goes through the displayed targets of the recording.
-pub(super) fn has_target_surface(shared: &Shared) -> bool {
-    let test = shared.recorded_test();
-    test.is_some_and(|test| matches!(test.positions, Positions::Surface(_)))
-}
-
 /// The choice of the target, where there are several.
 fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
-    if let Some(test) = shared.recorded_test().filter(|_| shared.result().is_some()) {
+    chosen_target_ui(ui, view, shared, "target of the answers");
+}
+
+/// The same in the card below.
+fn lower_target_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    chosen_target_ui(ui, view, shared, "target of the charts");
+}
+
+fn chosen_target_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, id: &str) {
+    if let Some(test) = shared
+        .test()
+        .filter(|test| test.skin.is_none() && shared.result().is_some())
+    {
         let targets = &test.problem.targets;
-        target_choice_ui(ui, "Target", "target of the charts", targets, &mut view.target);
+        target_choice_ui(ui, "Target", id, targets, &mut view.target);
     }
 }
 
 /// The charts below the surfaces, including the readings unless they have their own card, and the bar that goes through
 /// past epochs.
-pub fn charts_card_ui(
-    ui: &mut Ui,
-    view: &mut TrainView,
-    shared: &Shared,
-    has_readings: bool,
-    effects: &mut Vec<Effect>,
-) {
+pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_readings: bool) {
     /// Width of a card below which the longest name of a tab is cut.
     const NARROW: f32 = space(106);
     let is_narrow = ui.available_width() < NARROW;
     let offered = Vec::from_iter(charts(shared, has_readings));
-    let chart = offered
-        .iter()
-        .copied()
-        .find(|chart| chart.name == view.tab)
-        .unwrap_or(&LOSS);
+    let chart = offered.iter().find(|chart| chart.name == view.tab);
+    let chart = *chart.unwrap_or(&&LOSS);
     let tabs = offered.iter().map(|chart| match chart.name {
         "Training state" if is_narrow => (chart.name, "State"),
         name => (name, name),
     });
     view.tab = tabs_ui(ui, "Charts", &Vec::from_iter(tabs), chart.name).unwrap_or(chart.name);
-    (chart.bar_ui)(ui, view, shared);
     let past = shared.shown_run().map(|run| &run.past);
     let past = past.filter(|past| past.epochs().len() > 1);
     let mut place = ui.available_rect_before_wrap();
@@ -382,14 +452,7 @@ pub fn charts_card_ui(
         place.max.y -= scrub::HEIGHT;
     }
     ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
-        let is_possible = !shared.phase.is_busy();
-        if chart.name == READINGS.name {
-            readings_of_view_ui(ui, view, shared);
-        } else if let Some(figure) = chart.figure(view, shared) {
-            chart.figure_ui(ui, &figure, view, shared);
-        } else if invitation_ui(ui, chart.hint, "Train now", is_possible) {
-            effects.push(Effect::Train);
-        }
+        chart.show(ui, view, shared);
     });
     if let Some(past) = past {
         scrub_bar_ui(ui, &mut view.scrub, past);
@@ -399,9 +462,15 @@ pub fn charts_card_ui(
 /// Readings of the displayed surface. The one under the pointer lights up its nodes; a click cuts the surfaces along its
 /// wires.
 pub fn readings_of_view_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
-    let per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
+    let per_row = shared.skin().map_or(1, |skin| skin.sensor.scale.nodes_per_row());
     let row = view.lights.row.or(view.lights.node.map(|node| node / per_row));
-    let pointed = readings_ui(ui, view.drops_percent(), shared.test(), row, shared.look.colours);
+    let pointed = readings_ui(
+        ui,
+        view.drops_percent(),
+        shared.skin().map(|skin| &**skin),
+        row,
+        shared.look.colours,
+    );
     view.lights.row = pointed.as_ref().map(|pointed| pointed.cell[0]);
     if let Some(pointed) = pointed.filter(|pointed| pointed.is_clicked) {
         view.section.choose(pointed.cell);
@@ -413,16 +482,23 @@ impl TrainView {
     /// Offers each chart, and the steps through sections.
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
         // The readings have their own card if there is room.
-        for chart in charts(shared, false) {
+        let has_readings = !shared.has_report(offers.ctx.content_rect().width());
+        for chart in charts(shared, has_readings) {
             if offers.offer(Command::Chart(chart.name), chart.name != self.tab) {
                 self.tab = chart.name;
             }
         }
-        let Some(test) = shared.test().filter(|_| self.tab == SECTION.name) else {
+        let is_recording = shared.source == SourceKind::Recording;
+        for chart in upper_charts(shared).filter(|_| is_recording) {
+            if offers.offer(Command::Chart(chart.name), chart.name != self.upper) {
+                self.upper = chart.name;
+            }
+        }
+        let Some(skin) = shared.skin().filter(|_| self.tab == SECTION.name) else {
             return;
         };
         for (by, command) in [(-1, Command::PreviousSection), (1, Command::NextSection)] {
-            let stepped = self.section.stepped(by, test);
+            let stepped = self.section.stepped(by, skin);
             if offers.offer(command, stepped.is_some()) {
                 self.section = stepped.unwrap_or(self.section);
             }

@@ -2,36 +2,27 @@
 //! in the order of the pipeline.
 
 use decoupler_core::{
-    dataset::Simulation,
-    evaluation::{Outlook, RunSettings, TrainingSize, auto::AutoRecord},
+    evaluation::{Outlook, TrainingSize, auto::AutoRecord},
     scene::RowModel,
 };
-use eframe::egui::{Button, Ui};
+use eframe::egui::Ui;
 
-use super::{
-    exports::{PAPER_FIGURES, PaperFigure},
-    recording::RecordingEditor,
-};
+use super::recording::RecordingEditor;
 use crate::window::{
     forms::{self, Fields, SetBy},
     glossary,
     shared::{Effect, Phase, Shared, SourceKind},
     theme::space,
-    widgets::{dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui, segmented_ui},
+    widgets::{dim_ui, fields::capitalised, fold_ui, note_ui, scrolled_ui, segmented_ui},
 };
 
-/// The source and the settings of the next training. Returns the figure of the paper that the user picked, if any.
-pub fn configuration_ui(
-    ui: &mut Ui,
-    recording: &mut RecordingEditor,
-    shared: &Shared,
-    effects: &mut Vec<Effect>,
-) -> Option<PaperFigure> {
+/// The source and the settings of the next training.
+pub fn configuration_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, effects: &mut Vec<Effect>) {
     let before = match shared.source {
         SourceKind::Array => shared.draft,
         SourceKind::Recording => shared.recording.settings,
     };
-    let (mut settings, mut picked) = (before, None);
+    let mut settings = before;
     scrolled_ui(ui, "configuration", |ui| {
         ui.add_space(space(2));
         let sources = [
@@ -47,8 +38,7 @@ pub fn configuration_ui(
         if shared.source == SourceKind::Recording && shared.recording.is_automatic() {
             fields.set_by = SetBy::Choice(shared.chosen_run().map(|run| run.settings()));
         }
-        picked = settings_ui(ui, &mut fields, recording, shared, effects);
-        reset_ui(ui, &mut settings, shared);
+        settings_ui(ui, &mut fields, recording, shared, effects);
         ui.add_space(space(4));
     });
     forms::follow_preset(&before, &mut settings);
@@ -58,23 +48,25 @@ pub fn configuration_ui(
             SourceKind::Recording => Effect::ConfigureRecording(Box::new(settings)),
         });
     }
-    picked
 }
 
-/// The settings of either source. Returns the paper's figure that the user picked.
+/// The settings of either source.
 fn settings_ui(
     ui: &mut Ui,
     fields: &mut Fields<'_>,
     recording: &mut RecordingEditor,
     shared: &Shared,
     effects: &mut Vec<Effect>,
-) -> Option<PaperFigure> {
+) {
     let (is_recording, phase) = (shared.source == SourceKind::Recording, shared.phase);
     let (is_new, is_open) = (!phase.is_busy(), !phase.is_busy() || phase == Phase::Paused);
-    ui.add_enabled_ui(is_new, |ui| match fields.settings.simulation_mut() {
-        Some(simulation) => forms::array_ui(ui, simulation),
-        None => recording.files_ui(ui, shared, effects),
+    ui.add_enabled_ui(is_new, |ui| match is_recording {
+        true => recording.files_ui(ui, shared, effects),
+        false => forms::preset_ui(ui, fields.settings),
     });
+    if let Some(simulation) = fields.settings.simulation_mut() {
+        ui.add_enabled_ui(is_new, |ui| forms::array_ui(ui, simulation));
+    }
     if is_recording {
         recording.columns_button_ui(ui, shared);
         ui.add_space(space(2));
@@ -102,36 +94,26 @@ fn settings_ui(
             ui.separator();
             recording.folds_ui(ui, fields.settings, shared, effects);
         } else {
-            array_ui(ui, fields, shared.test().and_then(|test| test.outlook.as_ref()));
+            array_ui(ui, fields, shared.skin().and_then(|skin| skin.outlook.as_ref()));
         }
-        fold_ui(ui, "Network inputs", &fields.summary(forms::of_inputs), |ui| {
-            forms::inputs_ui(ui, fields, is_recording && recording.has_row_wires(), size);
-        });
     });
-    ui.add_enabled_ui(is_open, |ui| forms::training_ui(ui, fields, is_new));
-    let mut picked = None;
-    if !is_recording {
-        ui.add_enabled_ui(is_new, |ui| {
-            fold_ui(ui, "Figures of the paper", "", |ui| picked = paper_figures_ui(ui));
-        });
-    }
-    picked
+    let has_recorded_rows = is_recording && recording.has_row_wires();
+    ui.add_enabled_ui(is_open, |ui| {
+        forms::advanced_ui(ui, fields, is_new, has_recorded_rows, size);
+    });
 }
 
-/// Presets, scene, samples and geometry of a simulated array.
+/// Scene and samples of a simulated array.
 fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
-    forms::preset_ui(ui, fields.settings);
-    let Some(simulation) = fields.settings.simulation_mut() else {
+    let Some(&simulation) = fields.settings.simulation() else {
         return;
     };
-    forms::scene_choice_ui(ui, &mut simulation.scene);
     ui.add_space(space(2));
     ui.separator();
     // They stay visible while the scene is folded away.
     for warning in outlook.iter().flat_map(|outlook| &outlook.warnings) {
         note_ui(ui, &capitalised(&format!("{warning}.")));
     }
-    let simulation = *simulation;
     fold_ui(ui, "Scene", &forms::of_scene(&simulation.scene), |ui| {
         forms::scene_ui(ui, fields);
         forms::size_ui(ui, &simulation, outlook);
@@ -139,10 +121,6 @@ fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
     fold_ui(ui, "Samples", &forms::of_samples(fields.settings), |ui| {
         fields.show(ui, &forms::SAMPLES);
     });
-    if let Some(Simulation { sensor, .. }) = fields.settings.simulation_mut() {
-        let geometry = forms::of_geometry(&sensor.geometry);
-        fold_ui(ui, "Geometry", &geometry, |ui| forms::geometry_ui(ui, sensor));
-    }
 }
 
 /// The check box that leaves the settings of a recording to a choice by cross-validation, and what is known about it.
@@ -152,7 +130,7 @@ fn automatic_choice_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) 
     let reason = if has_one_network {
         "The training must end first."
     } else {
-        "Settings are chosen for one network for all row-wires: choose it under “Network inputs”, Rows."
+        "Settings are chosen for one network for all row-wires: choose it under “Advanced”, Rows."
     };
     ui.add_enabled_ui(has_one_network && !shared.phase.is_busy(), |ui| {
         let choice = ui.checkbox(&mut is_automatic, "Choose settings automatically");
@@ -171,43 +149,5 @@ fn automatic_choice_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) 
             }
         };
         dim_ui(ui, &note);
-    }
-}
-
-/// The paper's figures of single networks, one click each.
-fn paper_figures_ui(ui: &mut Ui) -> Option<PaperFigure> {
-    let mut picked = None;
-    let width = 0.5 * (ui.available_width() - space(1));
-    ui.spacing_mut().item_spacing = [space(1); 2].into();
-    ui.horizontal_wrapped(|ui| {
-        for figure in PAPER_FIGURES {
-            let button = ghost_button(figure.name).min_size([width, space(7)].into());
-            if ui.add(button).on_hover_text(figure.description).clicked() {
-                picked = Some(figure);
-            }
-        }
-    });
-    picked
-}
-
-/// The button that brings the usual settings of the source back.
-fn reset_ui(ui: &mut Ui, settings: &mut RunSettings, shared: &Shared) {
-    let (text, hint, usual) = match shared.source {
-        SourceKind::Array => (
-            "Reset to the paper's settings",
-            "10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples",
-            RunSettings::default(),
-        ),
-        SourceKind::Recording => (
-            "Reset to the default settings",
-            "Bayesian regularisation for recordings, 12 hidden nodes, 300 epochs",
-            RunSettings::measured(RowModel::Shared),
-        ),
-    };
-    ui.add_space(space(4));
-    let can_reset = !shared.phase.is_busy() && *settings != usual;
-    let reset = ui.add_enabled(can_reset, Button::new(text));
-    if reset.on_hover_text(hint).clicked() {
-        *settings = usual;
     }
 }

@@ -1,13 +1,17 @@
-//! Results of other decoders on the test set: measured on a separate thread once a training is paused and the user has
-//! unfolded their table, and shown as they arrive.
-//!
-//! The thread ends after the last decoder, or after the current one if it is cancelled.
+//! The other decoders: fitted to the training set and measured in the background, on the test set while a training is paused
+//! or has ended, and on each touch of the pressed surface; the newest set wins. Results are shown as they arrive.
 
-use std::{cell::Cell, path::Path, sync::Arc};
+use std::{
+    cell::Cell,
+    collections::HashMap,
+    path::Path,
+    sync::{Arc, Mutex, PoisonError},
+    time::Instant,
+};
 
 use decoupler_core::{
     dataset::Dataset,
-    decoupling::{DecoderKind, Precision},
+    decoupling::{Decoder, DecoderKind, Precision},
     evaluation::{DecoderReport, DecoderSet, ErrorMeasure, Errors},
     job::Job,
     network::Networks,
@@ -23,8 +27,7 @@ use crate::window::{
     glossary,
     job::{Background, JobError, Report, Wake},
     shared::{Exporting, NetworkSource, Phase, Shared, target_choice_ui},
-    theme::{Theme, space},
-    training_worker::RunId,
+    theme::{Palette, Theme, space},
     widgets::{ColumnWidth, TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
 };
 
@@ -36,17 +39,42 @@ enum MeasuringEvent {
     Ended(Result<(), JobError>),
 }
 
-/// The table of decoders, and the window's end of the thread.
-#[derive(Debug)]
+/// A network, and what it was trained on.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The network, or one for each row.
+    pub networks: Arc<Networks>,
+    /// Setup of its training.
+    pub setup: Setup,
+    /// Its channels.
+    pub problem: Arc<Problem>,
+}
+
+/// The decoders of a network's training set, and the window's end of the thread that measures them.
 pub struct Decoders {
-    /// True while the table is unfolded.
+    /// True while their table is unfolded.
     pub is_open: bool,
-    /// Results for the current training; none while it is running.
+    /// Results of all decoders, once they are asked for; none while the network changes.
     pub measured: Option<Vec<DecoderResult>>,
-    /// The training whose networks are measured, and its number of epochs at that time.
-    of: Option<(RunId, usize)>,
+    /// Those that are measured while the table is folded, too.
+    always: &'static [DecoderKind],
+    /// The network.
+    of: Option<Arc<Networks>>,
+    /// The set on which they are measured, and whether all are.
+    asked: Option<(Arc<Dataset>, bool)>,
+    fitted: Arc<Mutex<Fitted>>,
     job: Background<MeasuringEvent>,
 }
+
+/// The training set, and the decoders fitted to it so far.
+#[derive(Default)]
+struct Fitted {
+    set: Option<Result<DecoderSet, String>>,
+    decoders: HashMap<(DecoderKind, Precision), FittedDecoder>,
+}
+
+/// A decoder with the seconds that its fit took, or why it cannot be used.
+type FittedDecoder = Result<(Box<dyn Decoder>, f64), String>;
 
 /// Result of a decoder.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +85,8 @@ pub struct DecoderResult {
     pub precision: Precision,
     /// Report of the decoder, or why it cannot be used; none until it has been measured.
     pub report: Option<Result<DecoderReport, String>>,
+    /// True for a report on an earlier set.
+    pub is_past: bool,
 }
 
 impl DecoderResult {
@@ -66,61 +96,99 @@ impl DecoderResult {
             kind,
             precision,
             report: None,
+            is_past: false,
         };
         DecoderSet::kinds(problem).map(pending).collect()
     }
 }
 
+impl std::fmt::Debug for Decoders {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Decoders").finish_non_exhaustive()
+    }
+}
+
 impl Decoders {
-    /// Nothing measured yet. `wake` is called after each decoder and at the end.
-    pub fn new(wake: Wake) -> Self {
+    /// Nothing measured yet. `wake` is called after each decoder and at the end; those of the kinds `always` are measured
+    /// while the table is folded, too.
+    pub fn new(wake: Wake, always: &'static [DecoderKind]) -> Self {
         Self {
             is_open: false,
             measured: None,
+            always,
             of: None,
-            job: Background::new("decoders", wake),
+            asked: None,
+            fitted: Arc::default(),
+            job: match always {
+                [] => Background::new("decoders", wake),
+                _ => Background::prompt("decoders of a press", wake),
+            },
         }
     }
 
     /// Returns true while a result is missing.
     pub fn is_measuring(&self) -> bool {
         let mut results = self.measured.iter().flatten();
-        results.any(|result| result.report.is_none())
+        self.is_open && results.any(|result| result.report.is_none())
     }
 
-    /// Takes events, discards results of networks that have changed since, and measures the displayed networks once the
-    /// training is paused and the table is unfolded. What failed is tried again once the table is closed and opened.
-    pub fn follow(&mut self, shared: &Shared) {
+    /// Follows the training: its network is measured on the test set while it is paused or has ended.
+    pub fn follow_training(&mut self, shared: &Shared) {
         self.take_events();
-        let run = shared.run.as_ref();
+        let is_idle = matches!(shared.phase, Phase::Paused | Phase::Ended(_));
+        let run = shared.run.as_ref().filter(|_| is_idle);
         let standing = run.and_then(|run| Some((run, run.result.as_ref().filter(|result| result.is_idle)?)));
-        let of = standing.map(|(run, result)| (run.id, result.epochs_run));
-        let is_other = of.is_some() && self.of.is_some() && of != self.of;
+        match standing {
+            Some((run, result)) => self.follow(&result.networks, &run.test.set, || Subject {
+                networks: Arc::clone(&result.networks),
+                setup: run.setup.clone(),
+                problem: Arc::clone(&run.problem),
+            }),
+            None if shared.phase == Phase::Training => self.forget(),
+            None => {}
+        }
+    }
+
+    /// Takes results, discards those of another network, and measures the decoders on `set` if they are wanted; `subject` is
+    /// that of `networks`. What failed is tried again once the table is closed and opened.
+    pub fn follow(&mut self, networks: &Arc<Networks>, set: &Arc<Dataset>, subject: impl FnOnce() -> Subject) {
+        self.take_events();
+        let is_other = self.of.as_ref().is_some_and(|of| !Arc::ptr_eq(of, networks));
         let mut results = self.measured.iter().flatten();
         let has_failed = results.any(|result| matches!(result.report, Some(Err(_))));
-        if is_other || (has_failed && !self.is_open) || shared.phase == Phase::Training {
+        if is_other || (has_failed && !self.is_open && self.always.is_empty()) {
             self.forget();
         }
-        let is_wanted = self.is_open && self.measured.is_none();
-        if let (true, Phase::Paused | Phase::Ended(_), Some((run, result))) = (is_wanted, shared.phase, standing) {
-            self.of = of;
-            let (problem, test) = (Arc::clone(&run.problem), Arc::clone(run.test.set()));
-            self.begin(run.setup.clone(), problem, (*result.networks).clone(), test);
+        let is_wanted = self.is_open || !self.always.is_empty();
+        let is_asked = |(asked, are_all): &(Arc<Dataset>, bool)| Arc::ptr_eq(asked, set) && *are_all >= self.is_open;
+        if !is_wanted || self.asked.as_ref().is_some_and(is_asked) {
+            return;
         }
-    }
-
-    fn forget(&mut self) {
-        self.job.abandon();
-        (self.of, self.measured) = (None, None);
-    }
-
-    /// Measures all decoders of `setup` with their trained `networks` on `test`, which `problem` describes.
-    fn begin(&mut self, setup: Setup, problem: Arc<Problem>, networks: Networks, test: Arc<Dataset>) {
-        self.measured = Some(DecoderResult::pending(&problem));
+        if self.job.is_under_way() {
+            // Its decoder is fitted or measured, and then they are measured on this set.
+            return self.job.cancel();
+        }
+        (self.of, self.asked) = (Some(Arc::clone(networks)), Some((Arc::clone(set), self.is_open)));
+        let (subject, set, fitted) = (subject(), Arc::clone(set), Arc::clone(&self.fitted));
+        let results = self
+            .measured
+            .get_or_insert_with(|| DecoderResult::pending(&subject.problem));
+        results
+            .iter_mut()
+            .for_each(|result| result.is_past = result.report.is_some());
+        let wanted = results.iter().enumerate();
+        let wanted = wanted.filter(|(_, result)| self.is_open || self.always.contains(&result.kind));
+        let wanted = Vec::from_iter(wanted.map(|(place, result)| (place, (result.kind, result.precision))));
         self.job.start(
-            move |report| measure_all(&setup, &problem, networks, &test, report),
+            move |report| measure(&subject, &wanted, &set, &fitted, report),
             MeasuringEvent::Ended,
         );
+    }
+
+    /// Discards the results.
+    pub fn forget(&mut self) {
+        self.job.abandon();
+        (self.of, self.asked, self.measured, self.fitted) = (None, None, None, Arc::default());
     }
 
     fn take_events(&mut self) {
@@ -129,9 +197,11 @@ impl Decoders {
             match event {
                 MeasuringEvent::Measured(place, report) => {
                     if let Some(result) = results.nth(place) {
-                        result.report = Some(report);
+                        (result.report, result.is_past) = (Some(report), false);
                     }
                 }
+                // The decoders of a training are measured once.
+                MeasuringEvent::Ended(Ok(())) if self.always.is_empty() => self.fitted = Arc::default(),
                 MeasuringEvent::Ended(Ok(())) => {}
                 MeasuringEvent::Ended(Err(error)) => {
                     let reason = format!("{error}; close the table and open it again");
@@ -144,22 +214,45 @@ impl Decoders {
     }
 }
 
-fn measure_all(setup: &Setup, problem: &Problem, networks: Networks, test: &Dataset, report: &Report<MeasuringEvent>) {
+/// Measures one decoder after the other, each fitted when it is first asked for.
+fn measure(
+    subject: &Subject,
+    wanted: &[(usize, (DecoderKind, Precision))],
+    test: &Dataset,
+    fitted: &Mutex<Fitted>,
+    report: &Report<MeasuringEvent>,
+) {
     let is_cancelled = || report.is_cancelled();
-    let sets = setup.sets(Path::new(""), &Job::new(&is_cancelled), &mut |_| ());
-    let set = sets.map_err(|error| error.to_string()).map(|sets| {
-        let training = sets.sets.split.training;
-        DecoderSet::new(*setup.settings(), training, Some(networks))
-    });
-    for (place, wanted) in DecoderResult::pending(problem).into_iter().enumerate() {
+    // Only one job runs at a time, and a panic leaves whole decoders.
+    let Fitted { set, decoders } = &mut *fitted.lock().unwrap_or_else(PoisonError::into_inner);
+    if set.is_none() {
+        let sets = subject.setup.sets(Path::new(""), &Job::new(&is_cancelled), &mut |_| ());
+        let drawn = sets.map_err(|error| error.to_string()).map(|sets| {
+            let training = sets.sets.split.training;
+            DecoderSet::new(
+                *subject.setup.settings(),
+                training,
+                Some(Networks::clone(&subject.networks)),
+            )
+        });
+        *set = Some(drawn).filter(|_| !is_cancelled());
+    }
+    let Some(set) = set else { return };
+    for &(place, wanted) in wanted {
         if is_cancelled() {
             return;
         }
-        let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, test) {
-            Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
-            Err(error) => Err(error.to_string()),
-        };
-        let measured = set.as_ref().map_err(String::clone).and_then(measure);
+        let measured = set.as_ref().map_err(String::clone).and_then(|set| {
+            let decoder = decoders.entry(wanted).or_insert_with(|| {
+                let begun = Instant::now();
+                let fitted = set.decoder(wanted.0, wanted.1).map_err(|error| error.to_string())?;
+                let fitted = fitted.ok_or_else(|| "it needs a trained network".to_owned())?;
+                Ok((fitted, begun.elapsed().as_secs_f64()))
+            });
+            let (decoder, fit_seconds) = decoder.as_mut().map_err(|reason| reason.clone())?;
+            let measured = set.report(wanted, &mut **decoder, *fit_seconds, test);
+            measured.map_err(|error| error.to_string())
+        });
         report.send(MeasuringEvent::Measured(place, measured));
     }
 }
@@ -167,7 +260,7 @@ fn measure_all(setup: &Setup, problem: &Problem, networks: Networks, test: &Data
 /// A column of the table: its heading and meaning, and the figure of a decoder next to the model-based errors and for the
 /// displayed target.
 #[derive(Clone, Copy)]
-struct Figure {
+pub struct Figure {
     heading: &'static str,
     meaning: fn() -> &'static str,
     value: fn(&DecoderReport, Option<&Errors>, usize) -> Option<f64>,
@@ -209,15 +302,84 @@ const R2: Figure = Figure {
     value: |report, _, target| report.errors.targets().get(target)?.r2,
 };
 
+const MEAN_MM: Figure = Figure {
+    heading: "mean mm",
+    meaning: || "Mean |error| of z over the nodes of the pressed surface, in millimetres",
+    value: |report, _, _| Some(report.errors.nodes()?.z_mm),
+};
+
+const WORST_MM: Figure = Figure {
+    heading: "worst mm",
+    meaning: || "Largest |error| of z, in millimetres",
+    value: |report, _, _| Some(report.errors.nodes()?.worst_mm),
+};
+
 const FRAME_TIME: Figure = Figure {
     heading: "µs",
     meaning: || "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
     value: |report, _, _| Some(report.frame_us),
 };
 
-/// The other decoders on the same test set, folded away until the user asks for them, next to the `model_based`
-/// errors. `target` is the target whose errors are shown for a recording. Each decoder can be exported with
-/// `source`; returns the requested export.
+/// Figures of a touch.
+pub const OF_TOUCH: [Figure; 3] = [MEAN_MM, WORST_MM, FRAME_TIME];
+
+/// Returns the headings of a table of decoders.
+pub fn columns(figures: &[Figure]) -> Vec<TableColumn<'static>> {
+    let headings = figures
+        .iter()
+        .map(|figure| TableColumn::figure(figure.heading).meaning((figure.meaning)()));
+    [TableColumn::text("")].into_iter().chain(headings).collect()
+}
+
+/// Returns the row of a decoder; figures of an earlier set are pale.
+pub fn row<'a>(
+    result: &DecoderResult,
+    figures: &[Figure],
+    (model_based, target): (Option<&Errors>, usize),
+    palette: &Palette,
+) -> TableRow<'a> {
+    let cells = figures.iter().map(|figure| match &result.report {
+        None => "…".to_owned(),
+        Some(Err(_)) => format_number(None),
+        Some(Ok(report)) => match (figure.value)(report, model_based, target) {
+            value if figure.heading == R2.heading => format_r2(value),
+            value => format_number(value),
+        },
+    });
+    let colour = match result.kind {
+        _ if result.is_past => palette.dim,
+        DecoderKind::Network => palette.accent,
+        _ => palette.text,
+    };
+    TableRow::figures(result.kind.name(result.precision), cells)
+        .meaning(result.kind.meaning())
+        .colour(colour)
+}
+
+/// A table of decoders, folded away until the user asks for it; `contents_ui` shows what is measured.
+pub fn decoders_fold_ui(
+    ui: &mut Ui,
+    (name, hint): (&str, &str),
+    decoders: &mut Decoders,
+    contents_ui: impl FnOnce(&mut Ui, &[DecoderResult]),
+) {
+    ui.add_space(space(1));
+    let header = CollapsingHeader::new(name)
+        .open(Some(decoders.is_open))
+        .show(ui, |ui| match &decoders.measured {
+            Some(measured) => contents_ui(ui, measured),
+            None => {
+                dim_ui(ui, "They are measured when the training is paused or has ended.");
+            }
+        });
+    focus_ring_ui(ui, &header.header_response);
+    if header.header_response.on_hover_text(hint).clicked() {
+        decoders.is_open = !decoders.is_open;
+    }
+}
+
+/// The other decoders on the same test set, next to the `model_based` errors. `target` is the target whose errors are shown
+/// for a recording. Each decoder can be exported with `source`; returns the requested export.
 pub fn decoders_ui(
     ui: &mut Ui,
     decoders: &mut Decoders,
@@ -226,25 +388,15 @@ pub fn decoders_ui(
     source: Option<&NetworkSource>,
 ) -> Option<Exporting> {
     let mut asked = None;
-    ui.add_space(space(1));
-    let header = CollapsingHeader::new("More decoders")
-        .open(Some(decoders.is_open))
-        .show(ui, |ui| match &decoders.measured {
-            Some(measured) => asked = measured_ui(ui, measured, (problem, model_based), target, source),
-            None => {
-                dim_ui(ui, "They are measured when the training is paused or has ended.");
-            }
-        });
-    focus_ring_ui(ui, &header.header_response);
     let hint = if problem.has_nodes() {
         "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, times, and \
          ratio to the model-based error."
     } else {
         "Ridge regression, radial-basis network and others on the same test set: errors and times."
     };
-    if header.header_response.on_hover_text(hint).clicked() {
-        decoders.is_open = !decoders.is_open;
-    }
+    decoders_fold_ui(ui, ("More decoders", hint), decoders, |ui, measured| {
+        asked = measured_ui(ui, measured, (problem, model_based), target, source);
+    });
     asked
 }
 
@@ -255,7 +407,7 @@ fn measured_ui(
     target: &mut usize,
     source: Option<&NetworkSource>,
 ) -> Option<Exporting> {
-    let palette = Theme::of(ui).palette;
+    let palette = &Theme::of(ui).palette;
     // Ratios to rounding are meaningless.
     let model_based = model_based.filter(|errors| !errors.is_rounding());
     if !problem.has_nodes() {
@@ -269,26 +421,11 @@ fn measured_ui(
         (false, _) if ui.available_width() < space(80) => vec![RANGE_PERCENT, RMSE, FRAME_TIME],
         (false, _) => vec![RANGE_PERCENT, RMSE, R2, FRAME_TIME],
     };
-    let headings = figures
-        .iter()
-        .map(|figure| TableColumn::figure(figure.heading).meaning((figure.meaning)()));
-    let mut columns = vec![TableColumn::text("")];
-    columns.extend(headings);
+    let mut columns = columns(&figures);
     columns.push(TableColumn::text("").width(ColumnWidth::Points(space(7))));
     let asked = Cell::new(None);
     let rows = measured.iter().map(|result| {
-        let cells = figures.iter().map(|figure| match &result.report {
-            None => "…".to_owned(),
-            Some(Err(_)) => format_number(None),
-            Some(Ok(report)) => match (figure.value)(report, model_based, target) {
-                value if figure.heading == R2.heading => format_r2(value),
-                value => format_number(value),
-            },
-        });
-        let is_network = result.kind == DecoderKind::Network;
-        let row = TableRow::figures(result.kind.name(result.precision), cells)
-            .meaning(result.kind.meaning())
-            .colour(if is_network { palette.accent } else { palette.text });
+        let row = row(result, &figures, (model_based, target), palette);
         // The dialog has both precisions.
         let source = source.filter(|_| result.precision == Precision::Double && matches!(result.report, Some(Ok(_))));
         let Some(source) = source else { return row };
@@ -313,21 +450,22 @@ fn measured_ui(
     });
     let rows = rows.chain(of_model_based).collect();
     TableView::new("decoders", &columns).show_all(ui, rows);
+    notes_ui(ui, measured, true);
+    asked.into_inner()
+}
+
+/// Shows why decoders cannot be used and, if wanted, the remarks on their errors.
+pub fn notes_ui(ui: &mut Ui, measured: &[DecoderResult], has_remarks: bool) {
     for result in measured {
-        let name = result.kind.name(result.precision);
-        match &result.report {
-            None => {}
-            Some(Err(reason)) => {
-                note_ui(ui, &format!("{name}: {reason}"));
-            }
-            Some(Ok(report)) => {
-                for remark in &report.remarks {
-                    note_ui(ui, &format!("{name}: {remark}"));
-                }
-            }
+        let (reason, remarks) = match &result.report {
+            Some(Err(reason)) => (Some(reason), &[][..]),
+            Some(Ok(report)) if has_remarks => (None, &report.remarks[..]),
+            _ => (None, &[][..]),
+        };
+        for remark in reason.into_iter().chain(remarks) {
+            note_ui(ui, &format!("{}: {remark}", result.kind.name(result.precision)));
         }
     }
-    asked.into_inner()
 }
 
 #[cfg(test)]
@@ -367,15 +505,16 @@ mod tests {
         let run = Run::prepare(settings).unwrap();
         let (waking, woken) = channel();
         let wake = move || waking.send(()).unwrap_or(());
-        let mut decoders = Decoders::new(Arc::new(wake));
+        let mut decoders = Decoders::new(Arc::new(wake), &[]);
         let mut impossible = settings;
         impossible.simulation_mut().unwrap().samples = 0;
-        decoders.begin(
-            impossible.into(),
-            Arc::clone(run.problem()),
-            run.network(),
-            Arc::clone(run.test()),
-        );
+        decoders.is_open = true;
+        let networks = Arc::new(run.network());
+        decoders.follow(&networks, run.test(), || Subject {
+            networks: Arc::clone(&networks),
+            setup: impossible.into(),
+            problem: Arc::clone(run.problem()),
+        });
         assert!(decoders.is_measuring());
         while decoders.is_measuring() {
             woken.recv().unwrap();
@@ -395,7 +534,7 @@ mod tests {
         let mut measured = DecoderResult::pending(&problem);
         let place = measured.iter().position(|result| result.kind == kind).unwrap();
         measured[place].report = Some(report);
-        let mut decoders = Decoders::new(Arc::new(|| ()));
+        let mut decoders = Decoders::new(Arc::new(|| ()), &[]);
         (decoders.is_open, decoders.measured) = (true, Some(measured));
         Harness::new_ui(move |ui| {
             decoders_ui(ui, &mut decoders, (&problem, None), &mut 0, None);

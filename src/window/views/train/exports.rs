@@ -1,23 +1,15 @@
 //! What the Train view shows of the current training, for export.
 
-use decoupler_core::{
-    dataset::Simulation,
-    evaluation::{DecoderReport, RunSettings},
-    sensor::SensorModel,
-};
-use decoupler_files::{
-    export::{decoder_table, error_table, loss_table},
-    figure::surface::ViewMode,
-};
+use decoupler_core::{evaluation::DecoderReport, problem::Channel};
+use decoupler_files::export::{Cell, Table, decoder_table, error_table, loss_table};
 
 use super::{
-    charts::{NODES, has_target_surface, shown_chart},
-    surfaces::upper_figure,
+    charts::{SURFACES, lower_chart, upper_chart},
     view::TrainView,
 };
 use crate::window::{
     shared::{
-        FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult, RunView, Shared, Shown, SourceKind, file_stem,
+        FileTask, FileWords, NetworkSource, Phase, RunResult, RunView, Shared, Shown, SourceKind, file_stem,
         saying_saved,
     },
     training_worker::LOST,
@@ -31,12 +23,6 @@ pub const CHECKPOINT: FileWords = FileWords {
     extensions: &["checkpoint"],
 };
 
-const OPENED: FileWords = FileWords {
-    description: "Opens a training saved here or by train --checkpoint in a terminal, with its settings and its \
-                  history, and pauses it. A resumed training gives bit-identical results.",
-    ..CHECKPOINT
-};
-
 /// Task of saving the checkpoint of `run`.
 pub(super) fn checkpoint_task(run: &RunView) -> FileTask {
     let stem = file_stem("training", &run.setup);
@@ -44,17 +30,6 @@ pub(super) fn checkpoint_task(run: &RunView) -> FileTask {
         let file = run.ok_or(LOST)?.checkpoint_file()?;
         Ok(saying_saved(move |path| file.save(path)))
     })
-}
-
-/// Task of opening a checkpoint.
-pub(super) fn open_task(shared: &Shared) -> FileTask {
-    let run = shared.run.as_ref();
-    let setup = run.map_or_else(|| shared.draft.into(), |run| run.setup.clone());
-    FileTask {
-        words: OPENED,
-        suggestion: file_stem("training", &setup) + ".checkpoint",
-        purpose: Purpose::Open,
-    }
 }
 
 /// Returns what the view shows of the current training.
@@ -68,29 +43,31 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     };
     let past = view.scrub.result().map(|past| past.epochs_run);
     let mut shown = networks(view, &trained, past);
-    let (name, what) = match shared.look.mode {
-        _ if shared.source == SourceKind::Recording && !has_target_surface(shared) => ("Sample", "sample"),
-        ViewMode::ThreeD => ("Surfaces", "surfaces"),
-        ViewMode::Top => ("Surfaces", "surfaces-top"),
+    let upper = match shared.source {
+        SourceKind::Array => &SURFACES,
+        SourceKind::Recording => upper_chart(view, shared),
     };
-    let surfaces = run.clone().map(|_| || upper_figure(view, shared));
-    shown.push(Shown::figure(name, stem(what), surfaces));
-    let (chart, figure) = shown_chart(view, shared);
-    let figure = run.clone().and_then(|_| {
-        let figure = figure.ok_or("This chart has nothing to show yet.")?;
-        Ok(move || figure.clone())
-    });
-    shown.push(Shown::figure(
-        "Chart",
-        stem(&chart.to_lowercase().replace(' ', "-")),
-        figure,
-    ));
+    let lower = lower_chart(view, shared);
+    for (name, chart) in [(upper.name, upper), ("Chart", lower)] {
+        let figure = run.clone().and_then(|_| {
+            let figure = chart.figure(view, shared);
+            let figure = figure.ok_or("This chart has nothing to show yet.")?;
+            Ok(move || figure.clone())
+        });
+        let stem = stem(&chart.name.to_lowercase().replace(' ', "-"));
+        shown.push(Shown::figure(name, stem, figure));
+    }
     let errors = trained.map(|(run, latest)| {
         let result = view.result(shared).unwrap_or(latest);
         move || error_table(&run.error_table(result))
     });
     let of_epoch = past.map(|epoch| format!("-epoch{epoch}")).unwrap_or_default();
     shown.push(Shown::table("Error table", stem("errors") + &of_epoch, errors));
+    let predictions = run.clone().and_then(|run| {
+        let result = view.result(shared).ok_or("Nothing is decoded yet.")?;
+        Ok(move || predictions_table(run, result))
+    });
+    shown.push(Shown::table("Test predictions", stem("test") + &of_epoch, predictions));
     let losses = run.clone().map(|run| || loss_table(&run.history));
     shown.push(Shown::table("Loss curves", stem("loss"), losses));
     let decoders = run.clone().and_then(|run| {
@@ -102,11 +79,41 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     });
     shown.push(Shown::table("Decoder table", stem("decoders"), decoders));
     let standing = run.and_then(|run| match shared.phase {
+        _ if run.kept.is_some() => Err("A run of the list cannot be continued: train again.".to_owned()),
         Phase::Paused | Phase::Calibrating | Phase::Ended(_) => Ok(checkpoint_task(run)),
         _ => Err("A training under way cannot be saved: pause it first.".to_owned()),
     });
     shown.push(Shown::file("Checkpoint", standing));
     shown
+}
+
+/// Actual and decoded values of every test sample, with the half-widths of the 90 % intervals.
+fn predictions_table(run: &RunView, result: &RunResult) -> Table {
+    let (test, intervals) = (&run.test, result.intervals.as_ref());
+    let titled = |target: &Channel, what: &str| Channel {
+        name: format!("{}_{what}", target.name),
+        ..target.clone()
+    };
+    let of_target = |target: &Channel| {
+        let half_width = intervals.map(|_| titled(target, "half_width_90"));
+        let columns = [titled(target, "actual"), titled(target, "decoded")];
+        Vec::from_iter(columns.into_iter().chain(half_width).map(|channel| channel.title()))
+    };
+    let headings = run.problem.targets.iter().flat_map(of_target);
+    let rows = (0..test.set.samples()).map(|sample| {
+        let values = (0..test.set.outputs()).flat_map(|target| {
+            let [actual, decoded] = [test.set.targets()[[sample, target]], result.answers[[sample, target]]];
+            let half_width = intervals.map(|intervals| intervals.half_width(target, decoded));
+            [Some(actual), Some(decoded)]
+                .into_iter()
+                .chain(half_width)
+                .map(Cell::Number)
+        });
+        std::iter::once(Cell::from(test.timeline.name(sample)))
+            .chain(values)
+            .collect()
+    });
+    Table::of_headings(std::iter::once("sample".to_owned()).chain(headings), rows)
 }
 
 /// Returns the best network, and before it that of the `past` epoch while it is displayed.
@@ -119,17 +126,16 @@ fn networks<'a>(
         Ok(trained) => *trained,
         Err(reason) => return Shown::network("Best network", Err(reason.clone()), Vec::new()).into(),
     };
-    let setup = Box::new(run.setup.clone());
     let mut shown = Vec::new();
     if let Some(epoch) = past {
-        let source = NetworkSource::Past(run.id, setup.clone(), epoch, run.past.clone());
+        let setup = Box::new(run.setup.clone());
+        let source = NetworkSource::Past(run.id, setup, epoch, run.past.clone());
         let name = format!("Displayed network, epoch {epoch}");
         // The decoders were measured together with the best network.
         shown.extend(Shown::network(&name, Ok(source), Vec::new()));
     }
     let name = format!("Best network, epoch {}", latest.best_epoch);
-    let source = NetworkSource::Training(run.id, setup);
-    shown.extend(Shown::network(&name, Ok(source), measured(view)));
+    shown.extend(Shown::network(&name, Ok(NetworkSource::of(run)), measured(view)));
     shown
 }
 
@@ -138,65 +144,4 @@ fn measured(view: &TrainView) -> Vec<DecoderReport> {
     let results = view.decoders.measured.iter().flatten();
     let reports = results.filter_map(|result| result.report.as_ref()?.as_ref().ok());
     reports.cloned().collect()
-}
-
-/// A figure of the paper that the window can show: its configuration, and how its results are displayed.
-#[derive(Clone, Copy, Debug)]
-pub struct PaperFigure {
-    /// Its array and how it is displayed.
-    pub name: &'static str,
-    /// A description of the figure in a sentence.
-    pub description: &'static str,
-    scale: &'static str,
-    /// How its surfaces are viewed; `None` if it shows none.
-    pub mode: Option<ViewMode>,
-    /// Its chart; `None` if it shows none.
-    pub chart: Option<&'static str>,
-}
-
-/// The figures of the paper, in its order.
-pub const PAPER_FIGURES: [PaperFigure; 4] = [
-    PaperFigure {
-        name: "10×10, top view",
-        description: "Fig. 4: trains 10×10_5×30 with 12 hidden nodes and shows actual and decoded surface from above. \
-                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
-        scale: "10×10_5×30",
-        mode: Some(ViewMode::Top),
-        chart: None,
-    },
-    PaperFigure {
-        name: "10×6, nodes",
-        description: "Fig. 6: trains 10×6_3×18 with 12 hidden nodes and shows every node: actual as squares, decoded as \
-                      discs.",
-        scale: "10×6_3×18",
-        mode: None,
-        chart: Some(NODES.name),
-    },
-    PaperFigure {
-        name: "10×6, 3-D",
-        description: "Fig. 7: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoded surface in space. \
-                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
-        scale: "10×6_3×18",
-        mode: Some(ViewMode::ThreeD),
-        chart: None,
-    },
-    PaperFigure {
-        name: "10×6, top view",
-        description: "Fig. 8: trains 10×6_3×18 with 12 hidden nodes and shows actual and decoded surface from above. \
-                      Unlike the paper's spline, ours includes a plane: level nodes give a level surface.",
-        scale: "10×6_3×18",
-        mode: Some(ViewMode::Top),
-        chart: None,
-    },
-];
-
-impl PaperFigure {
-    /// Returns the settings of the training for the figure.
-    pub fn settings(&self) -> RunSettings {
-        let scale = self.scale.parse().expect("the paper's arrays are possible");
-        RunSettings::from(Simulation {
-            sensor: SensorModel::new(scale),
-            ..Simulation::default()
-        })
-    }
 }

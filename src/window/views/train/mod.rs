@@ -3,7 +3,6 @@
 mod charts;
 mod configuration;
 mod decoders;
-mod drawn;
 mod exports;
 mod press;
 mod recording;

@@ -4,24 +4,32 @@ use std::time::Duration;
 
 use decoupler_core::{
     dataset::SplitBy,
-    evaluation::{Combination, ErrorTable, Scores, Spread, StartRecord, TestErrors, best_start, error_remarks},
+    evaluation::{Combination, ErrorTable, Errors, Scores, Spread, StartRecord, TestErrors, best_start, error_remarks},
     identifiability::Identifiability,
+    text::counted,
     training::StopReason,
 };
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number, search_table},
+    export::{
+        Cell, Table, TableColumn, describe_search, describe_worse_than_ridge, format_duration, format_number,
+        search_table,
+    },
     figure::frame_time,
+    import::Setup,
 };
-use eframe::egui::{Align, Layout, Response, RichText, Ui};
+use eframe::egui::{Align, Button, Frame, Layout, Margin, Response, RichText, Stroke, Ui, WidgetInfo, accesskit::Role};
 
-use super::{decoders::decoders_ui, exports::open_task, press::press_section_ui, recording::bias, view::TrainView};
+use super::{decoders::decoders_ui, press::press_section_ui, recording::bias, view::TrainView};
 use crate::window::{
     glossary,
-    shared::{Effect, NetworkSource, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
-    test_view::TestView,
-    theme::{space, type_size},
+    shared::{
+        Effect, ExportLine, Exporting, NetworkSource, RunResult, RunView, Shared, SourceKind, ViewKind, error_table_ui,
+        sentence, targets_table_ui,
+    },
+    test_view::Skin,
+    theme::{Theme, radius, space, type_size},
     widgets::{
-        described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
+        described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, primary_button, scrolled_ui,
         section_heading_ui,
     },
 };
@@ -29,73 +37,102 @@ use crate::window::{
 /// The name of the network's row.
 const NETWORK: &str = "network";
 
-/// The error table, the button that opens a checkpoint, and the cost of the training. Before a training, the baselines.
+/// The verdict on a training with what mends the cause, its errors, and what can be done with it; the rest in Details. Before
+/// a training, the baselines.
 pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
         press_section_ui(ui, &mut view.press, shared);
-        section_heading_ui(ui, "Errors on the test set");
         let result = view.result(shared).cloned();
-        let shown = shared.shown_run().zip(result.as_ref());
-        match shown {
-            Some((run, result)) => errors_ui(ui, view, shared, (run, result), effects),
-            None => expectation_ui(ui, shared),
+        let Some((run, result)) = shared.shown_run().zip(result.as_ref()) else {
+            section_heading_ui(ui, "Errors on the test set");
+            return expectation_ui(ui, shared);
+        };
+        ui.add_space(space(1));
+        let is_old = shared.is_old(run);
+        if is_old {
+            previous_ui(ui, run, effects);
         }
-        section_heading_ui(ui, "Open");
-        let can_open = !shared.phase.is_busy();
-        ui.add_enabled_ui(can_open, |ui| {
-            let button = ghost_button("Open checkpoint…").min_size([ui.available_width(), space(7)].into());
-            let task = open_task(shared);
-            if ui.add(button).on_hover_text(task.words.description).clicked() {
-                effects.push(Effect::ChooseFile(task));
+        let remarks = match (view.scrub.epoch(), run.stop_reason) {
+            (None, Some(reason)) if !is_old => verdict_ui(ui, view, shared, (run, result, reason), effects),
+            _ => Vec::new(),
+        };
+        section_heading_ui(ui, "Errors on the test set");
+        let tables = run.error_table(result);
+        ui.scope(|ui| {
+            if is_old {
+                ui.multiply_opacity(OLD);
+            }
+            match run.problem.has_nodes() {
+                true => error_table_ui(ui, &tables),
+                false => targets_table_ui(ui, &tables),
             }
         });
-        if let Some((run, result)) = shown {
-            section_heading_ui(ui, "Cost");
-            cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
+        if view.scrub.epoch().is_some() {
+            dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
+        }
+        if let (Some(errors), Some(skin)) = (result.errors.nodes(), &run.test.skin) {
+            worst_node_ui(ui, view, errors, skin);
+        }
+        let summary = match remarks.len() {
+            0 => String::new(),
+            count => counted(count, "remark"),
+        };
+        fold_ui(ui, "Details", &summary, |ui| {
+            for remark in &remarks {
+                note_ui(ui, remark);
+            }
+            if !run.problem.has_nodes() {
+                error_table_ui(ui, &tables);
+            }
+            details_ui(ui, view, (run, result), effects);
+        });
+        use_ui(ui, run, effects);
+        runs_ui(ui, shared, effects);
+    });
+}
+
+/// Opacity of a result of other settings than those on the left.
+pub const OLD: f32 = 0.5;
+
+/// Says that the settings have changed, with the ways out.
+fn previous_ui(ui: &mut Ui, run: &RunView, effects: &mut Vec<Effect>) {
+    dim_ui(ui, "Result of the previous settings.");
+    ui.horizontal(|ui| {
+        if ui.add(ghost_button("Train again")).clicked() {
+            effects.push(Effect::Train);
+        }
+        let hint = "Goes back to the settings of this result.";
+        if ui.add(ghost_button("Undo changes")).on_hover_text(hint).clicked() {
+            let plan = run.asked.plan.as_deref().map(|plan| (**plan).clone());
+            let setup = Setup::of(run.asked.settings, plan).expect("it was that of a training");
+            effects.push(Effect::TakeSetup(Box::new(setup)));
+            effects.push(Effect::ChooseAutomatically(run.search.is_some()));
         }
     });
 }
 
-/// The errors of the displayed network, what they mean, and how they came about.
-fn errors_ui(
-    ui: &mut Ui,
-    view: &mut TrainView,
-    shared: &Shared,
-    (run, result): (&RunView, &RunResult),
-    effects: &mut Vec<Effect>,
-) {
-    error_table_ui(ui, &run.error_table(result));
-    match (view.scrub.epoch(), run.stop_reason) {
-        (Some(_), _) => {
-            dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
-        }
-        (None, Some(reason)) => verdict_ui(ui, shared, (run, result), reason),
-        (None, None) => {}
+/// The node with the largest error, and the way to it.
+fn worst_node_ui(ui: &mut Ui, view: &mut TrainView, errors: &Errors, skin: &Skin) {
+    let worst = errors.worst_node;
+    ui.add_space(space(1));
+    let text = format!("Worst node {} mm", format_number(errors.worst_mm));
+    let text = RichText::new(text).size(type_size().note);
+    let show_ui = |ui: &mut Ui| {
+        let [snapshot, row, node] = [worst.snapshot, worst.row, worst.node].map(|place| place + 1);
+        let hint = format!("Go to snapshot {snapshot}, row {row}, node {node}");
+        ui.small_button("Show").on_hover_text(hint)
+    };
+    let (name, show) = line_ui(ui, text, show_ui);
+    name.on_hover_text(glossary::WORST_NODE.hint);
+    if show.clicked() {
+        view.go_to(worst.snapshot, skin.node(worst));
     }
-    if let Some(test) = run.test.array() {
-        conditioning_ui(ui, test);
-    }
-    if let Some(note) = run.baselines.model_based_note() {
-        note_ui(ui, note);
-    }
-    if let (Some(errors), Some(test)) = (result.errors.nodes(), run.test.array()) {
-        let worst = errors.worst_node;
-        ui.add_space(space(1));
-        let text = format!("Worst node {} mm", format_number(errors.worst_mm));
-        let text = RichText::new(text).size(type_size().note);
-        let show_ui = |ui: &mut Ui| {
-            let [snapshot, row, node] = [worst.snapshot, worst.row, worst.node].map(|place| place + 1);
-            let hint = format!("Go to snapshot {snapshot}, row {row}, node {node}");
-            ui.small_button("Show").on_hover_text(hint)
-        };
-        let (name, show) = line_ui(ui, text, show_ui);
-        name.on_hover_text(glossary::WORST_NODE.hint);
-        if show.clicked() {
-            view.go_to(worst.snapshot, test.node(worst));
-        }
-    }
+}
+
+/// Other decoders, restarts, the choice of settings, and the cost.
+fn details_ui(ui: &mut Ui, view: &mut TrainView, (run, result): (&RunView, &RunResult), effects: &mut Vec<Effect>) {
     let model_based = run.baselines.model_based.as_ref().and_then(TestErrors::nodes);
-    let source = { view.decoders.is_open }.then(|| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
+    let source = { view.decoders.is_open }.then(|| NetworkSource::of(run));
     let (decoders, target) = (&mut view.decoders, &mut view.target);
     let measured = (&*run.problem, model_based);
     let asked = decoders_ui(ui, decoders, measured, target, source.as_ref());
@@ -109,6 +146,60 @@ fn errors_ui(
     }
     spread_ui(ui, run);
     search_ui(ui, run);
+    section_heading_ui(ui, "Cost");
+    cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
+}
+
+/// What can be done with a trained network.
+fn use_ui(ui: &mut Ui, run: &RunView, effects: &mut Vec<Effect>) {
+    section_heading_ui(ui, "Use it");
+    let exporting = |line| Effect::Export(Box::new(Exporting::new(line, "")));
+    let decode = NetworkSource::of(run).decode();
+    let hint = decode.words.description;
+    let live = "Decodes readings as they arrive.";
+    let [network, report] = [ExportLine::Network, ExportLine::Report].map(|line| (line.words().1, exporting(line)));
+    let buttons = [
+        ("Decode file…", hint, Effect::ChooseFile(decode)),
+        ("Test it live", live, Effect::Show(ViewKind::Live)),
+        ("Export network…", network.0, network.1),
+        ("Save report…", report.0, report.1),
+    ];
+    let width = 0.5 * (ui.available_width() - space(1));
+    ui.spacing_mut().item_spacing = [space(1); 2].into();
+    ui.horizontal_wrapped(|ui| {
+        for (text, hint, effect) in buttons {
+            let button = ghost_button(text).min_size([width, space(7)].into());
+            if ui
+                .add_enabled(run.stop_reason.is_some(), button)
+                .on_hover_text(hint)
+                .clicked()
+            {
+                effects.push(effect);
+            }
+        }
+    });
+}
+
+/// The latest runs of the list.
+fn runs_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    /// More are in the Compare view.
+    const LATEST: usize = 5;
+    let runs = &shared.runs.workspace.runs;
+    if runs.is_empty() {
+        return;
+    }
+    section_heading_ui(ui, "Runs");
+    for run in runs.iter().rev().take(LATEST) {
+        let name = format!("Open {}", run.name);
+        let open_ui = |ui: &mut Ui| {
+            let button = ui.add_enabled(!shared.phase.is_busy(), Button::new("Open").small());
+            button.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
+            button
+        };
+        if line_ui(ui, RichText::new(&run.name), open_ui).1.clicked() {
+            effects.push(Effect::OpenRun(run.id));
+        }
+    }
 }
 
 /// A name, and its value at the right end of the line.
@@ -170,7 +261,9 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         rows.filter(|row| row.name == NETWORK)
             .for_each(|row| row.errors.fill(None));
         error_table_ui(ui, &tables);
-        conditioning_ui(ui, &preview.test);
+        if let Some(note) = preview.test.skin.as_ref().and_then(|skin| ill_conditioned(skin)) {
+            note_ui(ui, &note);
+        }
         ui.add_space(space(2));
     }
     // The paper's own network, not only its scene.
@@ -183,59 +276,114 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
     );
 }
 
-/// Reports where a baseline is better and what would help, or by how much the network is better.
-fn verdict_ui(ui: &mut Ui, shared: &Shared, (run, result): (&RunView, &RunResult), reason: StopReason) {
-    ui.add_space(space(2));
-    let (settings, baselines) = (run.settings(), &run.baselines);
-    let defect = result.defect.clone();
-    let (faults, praise) = if let (Some(errors), Some(linear)) = (result.errors.nodes(), baselines.linear.nodes()) {
-        let remarks = error_remarks(settings, &run.scores(result), Some(reason));
-        let remark = remarks.iter().find(|(row, _)| *row == NETWORK);
-        let remark = remark.map(|(row, remark)| format!("{row}: {remark}"));
-        let is_worse = (errors.z_mm > linear.z_mm).then(|| {
-            let remedy = reason.remedy(&settings.training.method);
-            format!("a linear map of the resistances is better on z than this network: {remedy}")
-        });
-        let fault = defect.or(remark).or(is_worse);
-        let praise = (fault.is_none() && errors.z_mm > 0.0).then(|| {
-            let text = format!(
-                "On z {} times as accurate as the linear map",
-                format_number(linear.z_mm / errors.z_mm)
-            );
-            let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
-            match model_based.and_then(|model_based| errors.times(model_based)) {
-                None => format!("{text}."),
-                Some(ratio) => format!("{text}; {} times the model-based error.", format_number(ratio)),
-            }
-        });
-        (Vec::from_iter(fault.map(|fault| capitalised(&fault))), praise)
-    } else {
-        let pairs = result.errors.targets().iter().zip(baselines.linear.targets());
-        let ratios = pairs.map(|(network, ridge)| ridge.rmse / network.rmse);
-        let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
-        let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
-        let is_better = defect.is_none() && ratios.iter().all(|ratio| *ratio > 1.0);
-        let range = extreme(f64::min).zip(extreme(f64::max)).filter(|_| is_better);
-        let praise = range.map(|(low, high)| {
-            let times = if low == high { low } else { format!("{low} to {high}") };
-            format!("{times} times as accurate as ridge regression.")
-        });
-        let defect = defect.map(|defect| capitalised(&defect)).into_iter();
-        (defect.chain(result.remarks.iter().cloned()).collect(), praise)
+/// A remark on a result, and the button that mends its cause.
+type Remark = (String, Option<(String, Vec<Effect>)>);
+
+/// Reports the most urgent remark with what mends it, or by how much the network is better; returns the other remarks.
+fn verdict_ui(
+    ui: &mut Ui,
+    view: &TrainView,
+    shared: &Shared,
+    (run, result, reason): (&RunView, &RunResult, StopReason),
+    effects: &mut Vec<Effect>,
+) -> Vec<String> {
+    let cures = view.recording.cures(shared).into_iter();
+    let cures = cures.map(|(text, button, effect)| (text, Some((button, vec![effect, Effect::Train]))));
+    let mut remarks = Vec::<Remark>::from_iter(cures);
+    remarks.extend(result.defect.as_ref().map(|defect| (capitalised(defect), None)));
+    let praise = match (result.errors.nodes(), run.baselines.linear.nodes()) {
+        (Some(errors), Some(linear)) => of_nodes(run, (result, errors, linear), reason, &mut remarks),
+        _ => of_targets(run, result, &mut remarks),
     };
-    for fault in &faults {
-        note_ui(ui, &sentence(fault));
+    let mut remarks = remarks.into_iter();
+    match (remarks.next(), praise) {
+        (Some((text, cure)), _) => {
+            note_ui(ui, &sentence(&text));
+            let (name, cure) = cure.unzip();
+            if name.is_some_and(|name| ui.add(primary_button(&name)).clicked()) {
+                effects.extend(cure.unwrap_or_default());
+            }
+        }
+        (None, Some(praise)) => good_ui(ui, &praise),
+        (None, None) => {}
     }
-    if let Some(praise) = praise {
-        dim_ui(ui, &praise);
+    remarks.map(|(text, _)| sentence(&text)).collect()
+}
+
+/// Adds the remarks on the errors of nodes; returns by how much the network is better than the linear map.
+fn of_nodes(
+    run: &RunView,
+    (result, errors, linear): (&RunResult, &Errors, &Errors),
+    reason: StopReason,
+    remarks: &mut Vec<Remark>,
+) -> Option<String> {
+    let (settings, baselines) = (run.settings(), &run.baselines);
+    let of_network = error_remarks(settings, &run.scores(result), Some(reason));
+    let of_network = of_network.iter().find(|(row, _)| *row == NETWORK);
+    if let (Some((row, remark)), None) = (of_network, &result.defect) {
+        remarks.push((capitalised(&format!("{row}: {remark}")), None));
+    } else if errors.z_mm > linear.z_mm && result.defect.is_none() {
+        let remedy = reason.remedy(&settings.training.method);
+        let text = format!("A linear map of the resistances is better on z than this network: {remedy}");
+        remarks.push((text, None));
     }
+    let condition = run.test.skin.as_ref().and_then(|skin| ill_conditioned(skin));
+    let notes = condition
+        .into_iter()
+        .chain(baselines.model_based_note().map(str::to_owned));
+    let is_good = remarks.is_empty() && errors.z_mm > 0.0;
+    remarks.extend(notes.map(|note| (note, None)));
+    let times = format_number(linear.z_mm / errors.z_mm);
+    let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
+    let ratio = model_based.and_then(|model_based| errors.times(model_based));
+    let ratio = ratio.map_or_else(String::new, |ratio| {
+        format!("; {} times the model-based error", format_number(ratio))
+    });
+    is_good.then(|| format!("On z {times} times as accurate as the linear map{ratio}."))
+}
+
+/// Adds the remarks on the errors of targets; returns by how much the network is better than ridge regression.
+fn of_targets(run: &RunView, result: &RunResult, remarks: &mut Vec<Remark>) -> Option<String> {
+    let pairs = result.errors.targets().iter().zip(run.baselines.linear.targets());
+    let ratios = pairs.map(|(network, ridge)| ridge.rmse / network.rmse);
+    let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
+    let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
+    let may_use_ridge =
+        run.kept.is_none() && run.stop_reason != Some(StopReason::Stopped) && result.networks.only().is_some();
+    let worse = describe_worse_than_ridge(&run.problem, &run.scores(result));
+    for remark in &result.remarks {
+        let cure =
+            (may_use_ridge && worse.as_ref() == Some(remark)).then(|| ("Use ridge".to_owned(), vec![Effect::UseRidge]));
+        remarks.push((remark.clone(), cure));
+    }
+    // What has a button comes first.
+    remarks.sort_by_key(|(_, cure)| cure.is_none());
     let plan = run.setup.plan();
     if plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random) {
-        note_ui(ui, bias(SplitBy::Random));
+        remarks.push((bias(SplitBy::Random).to_owned(), None));
     }
-    if shared.has_changed_since(run) {
-        dim_ui(ui, "The settings have changed since this training.");
-    }
+    let (low, high) = extreme(f64::min).zip(extreme(f64::max))?;
+    let times = if low == high { low } else { format!("{low} to {high}") };
+    let holds = match result.coverage.iter().any(Option::is_some) {
+        true => ", and its intervals hold on the test samples",
+        false => "",
+    };
+    let is_better = ratios.iter().all(|ratio| *ratio > 1.0);
+    is_better.then(|| format!("{times} times as accurate as ridge regression{holds}."))
+}
+
+/// Shows a tinted note, for a success.
+fn good_ui(ui: &mut Ui, text: &str) {
+    let good = Theme::of(ui).palette.good;
+    Frame::new()
+        .fill(good.gamma_multiply(0.08))
+        .stroke(Stroke::new(1.0, good.gamma_multiply(0.3)))
+        .corner_radius(radius())
+        .inner_margin(Margin::symmetric(8, 8))
+        .show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            ui.label(RichText::new(text).size(type_size().note).color(good));
+        });
 }
 
 fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
@@ -263,22 +411,18 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
 }
 
-/// Notes that the scene is ill-conditioned, so that its errors are not blamed on the network.
-fn conditioning_ui(ui: &mut Ui, test: &TestView) {
-    let condition = test.outlook.as_ref().map(|outlook| outlook.worst_row.condition());
-    let Some(condition) = condition.filter(|condition| *condition >= Identifiability::LARGEST_CONDITION) else {
-        return;
-    };
+/// Says that the scene is ill-conditioned, so that its errors are not blamed on the network.
+fn ill_conditioned(skin: &Skin) -> Option<String> {
+    let condition = skin.outlook.as_ref()?.worst_row.condition();
     let condition = match condition.is_finite() {
+        _ if condition < Identifiability::LARGEST_CONDITION => return None,
         true => format!("{condition:.0e}"),
         false => "infinite".to_owned(),
     };
-    ui.add_space(space(2));
-    let text = format!(
-        "This scene is ill-conditioned (condition number {condition}): no decoder can \
-         distinguish some deformations. The note under Scene says what to change."
-    );
-    note_ui(ui, &text);
+    Some(format!(
+        "This scene is ill-conditioned (condition number {condition}): no decoder can distinguish some deformations. The note \
+         under Scene says what to change."
+    ))
 }
 
 /// Shows the spread of the results of several starts: three figures of each error. Nothing for one start.
@@ -287,7 +431,11 @@ fn spread_ui(ui: &mut Ui, run: &RunView) {
     let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
         return;
     };
-    section_heading_ui(ui, &format!("Spread over {} restarts", starts.len()));
+    let heading = match run.settings().combine {
+        Combination::Best => format!("Spread over {} restarts", starts.len()),
+        Combination::Mean => format!("The {} networks, each alone", starts.len()),
+    };
+    section_heading_ui(ui, &heading);
     let is_held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if is_held_out { "validation mse" } else { "training mse" };
     let spreads = [
@@ -321,7 +469,9 @@ fn spread_ui(ui: &mut Ui, run: &RunView) {
         ui,
         &match run.settings().combine {
             Combination::Best => format!("Start {best} is kept: it has the lowest {error}."),
-            Combination::Mean => format!("The mean of all starts is kept; start {best} has the lowest {error}."),
+            Combination::Mean => format!(
+                "Their average is used, which is often better than each; network {best} has the lowest {error}."
+            ),
         },
     );
 }

@@ -9,7 +9,7 @@ use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, access
 use crate::window::{
     job::{Background, JobError, Wake},
     shared::{Effect, Matter, Notice, RunResult, Shared},
-    test_view::TestSet,
+    test_view::TestView,
     theme::{Theme, space, type_size},
     training_worker::{PastNetworks, RunId},
     widgets::{ghost_button, slider_ui},
@@ -136,16 +136,17 @@ fn result_at(
     past: &PastNetworks,
     present: RunResult,
     problem: &Problem,
-    test: &TestSet,
+    test: &TestView,
 ) -> Option<RunResult> {
     let past = past.at(epoch, &present.networks)?;
-    let answers = ProgramDecoder::new(past.networks.decoder_program(problem, None)).answers_to(test.set());
+    let answers = ProgramDecoder::new(past.networks.decoder_program(problem, None)).answers_to(&test.set);
     Some(RunResult {
-        errors: TestErrors::measure(problem, test.set(), &answers),
+        errors: TestErrors::measure(problem, &test.set, &answers),
         network_alone: None,
-        charts: test.recording().map(|test| Arc::new(test.charts(&answers))),
+        charts: Arc::new(test.charts(&answers)),
         remarks: Vec::new(),
         coverage: Vec::new(),
+        intervals: None,
         best_epoch: past.best_epoch,
         defect: None,
         epochs_run: epoch,

@@ -9,7 +9,7 @@ use glam::DVec2;
 
 use crate::window::{
     shared::Look,
-    test_view::{Drawing, TestView},
+    test_view::{Drawing, Skin},
     theme::space,
     widgets::{dim_ui, explained_options_ui},
 };
@@ -34,22 +34,22 @@ pub struct SectionChoice {
 }
 
 /// Numbers of row-wires read and of column-wires.
-fn counts(test: &TestView) -> [usize; 2] {
-    [test.rows.len(), test.sensor.scale.columns()]
+fn counts(skin: &Skin) -> [usize; 2] {
+    [skin.rows.len(), skin.sensor.scale.columns()]
 }
 
 impl SectionChoice {
     /// Places of the row-wire and the column-wire, within the sensor.
-    fn wires(&self, test: &TestView) -> [usize; 2] {
-        let counts = counts(test);
+    fn wires(&self, skin: &Skin) -> [usize; 2] {
+        let counts = counts(skin);
         let wires = self.wires.unwrap_or(counts.map(|count| count / 2));
         [0, 1].map(|axis| wires[axis].min(counts[axis].saturating_sub(1)))
     }
 
-    /// Returns the section through the sensor of `test`.
-    pub fn section(&self, test: &TestView) -> Section {
-        let ([place, column], geometry) = (self.wires(test), &test.sensor.geometry);
-        let row = test.rows.get(place).copied().unwrap_or(0);
+    /// Returns the section through the sensor of `skin`.
+    pub fn section(&self, skin: &Skin) -> Section {
+        let ([place, column], geometry) = (self.wires(skin), &skin.sensor.geometry);
+        let row = skin.rows.get(place).copied().unwrap_or(0);
         let (line, at_mm) = match self.along {
             Along::RowWires => (SectionLine::RowWire(row), geometry.row_x_mm(row)),
             Along::ColumnWires => (SectionLine::ColumnWire(column), geometry.column_node_mm(column, 0).y),
@@ -58,10 +58,10 @@ impl SectionChoice {
     }
 
     /// Returns the choice of the wire before this one (`by` −1) or after it (+1), if there is one.
-    pub fn stepped(&self, by: isize, test: &TestView) -> Option<Self> {
-        let (axis, mut wires) = (self.along as usize, self.wires(test));
+    pub fn stepped(&self, by: isize, skin: &Skin) -> Option<Self> {
+        let (axis, mut wires) = (self.along as usize, self.wires(skin));
         let place = wires[axis].checked_add_signed(by);
-        wires[axis] = place.filter(|place| *place < counts(test)[axis])?;
+        wires[axis] = place.filter(|place| *place < counts(skin)[axis])?;
         let wires = Some(wires);
         Some(Self { wires, ..*self })
     }
@@ -72,25 +72,25 @@ impl SectionChoice {
     }
 
     /// Cuts along the wires nearest to a place.
-    pub fn choose_at(&mut self, place_mm: DVec2, test: &TestView) {
+    pub fn choose_at(&mut self, place_mm: DVec2, skin: &Skin) {
         fn nearest(places_mm: impl Iterator<Item = f64>, at_mm: f64) -> usize {
             let distances = places_mm.map(|place_mm| (place_mm - at_mm).abs()).enumerate();
             let nearest = distances.min_by(|one, other| one.1.total_cmp(&other.1));
             nearest.map_or(0, |(place, _)| place)
         }
-        let geometry = &test.sensor.geometry;
-        let rows = test.rows.iter().map(|&row| geometry.row_x_mm(row));
-        let columns = (0..test.sensor.scale.columns()).map(|column| geometry.column_node_mm(column, 0).y);
+        let geometry = &skin.sensor.geometry;
+        let rows = skin.rows.iter().map(|&row| geometry.row_x_mm(row));
+        let columns = (0..skin.sensor.scale.columns()).map(|column| geometry.column_node_mm(column, 0).y);
         self.choose([nearest(rows, place_mm.x), nearest(columns, place_mm.y)]);
     }
 }
 
 /// Returns the figure of the section through the displayed surfaces.
-pub fn section_of(choice: &SectionChoice, test: &TestView, drawing: &Drawing, look: Look) -> PlotFigure {
+pub fn section_of(choice: &SectionChoice, skin: &Skin, drawing: &Drawing, look: Look) -> PlotFigure {
     let dressed = |surface| look.dressed(surface, String::new());
     let decoded = drawing.decoded.as_ref().map(|[decoded, _]| dressed(decoded));
-    let (section, actual) = (choice.section(test), dressed(&drawing.actual));
-    section_figure(&section, &test.rows, &actual, decoded.as_ref())
+    let (section, actual) = (choice.section(skin), dressed(&drawing.actual));
+    section_figure(&section, &skin.rows, &actual, decoded.as_ref())
 }
 
 const DIRECTIONS: [(Along, &str, &str); 2] = [
@@ -107,15 +107,15 @@ const DIRECTIONS: [(Along, &str, &str); 2] = [
 ];
 
 /// The choice of the section.
-pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, test: &TestView) {
+pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, skin: &Skin) {
     ui.horizontal(|ui| {
         let picked = explained_options_ui(ui, "Section along", &DIRECTIONS, choice.along, false);
         choice.along = picked.unwrap_or(choice.along);
         ui.add_space(space(1));
-        step_ui(ui, choice, -1, test);
+        step_ui(ui, choice, -1, skin);
         let axis = choice.along as usize;
-        ui.label(format!("{} of {}", choice.wires(test)[axis] + 1, counts(test)[axis]));
-        step_ui(ui, choice, 1, test);
+        ui.label(format!("{} of {}", choice.wires(skin)[axis] + 1, counts(skin)[axis]));
+        step_ui(ui, choice, 1, skin);
         let hint = "or click a surface or a reading";
         let font = TextStyle::Body.resolve(ui.style());
         let galley = ui.painter().layout_no_wrap(hint.to_owned(), font, Color32::WHITE);
@@ -126,12 +126,12 @@ pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, test: &TestView) 
 }
 
 /// An arrow to the wire before (`by` −1) or after (+1).
-fn step_ui(ui: &mut Ui, choice: &mut SectionChoice, by: isize, test: &TestView) {
+fn step_ui(ui: &mut Ui, choice: &mut SectionChoice, by: isize, skin: &Skin) {
     let (text, name, hint) = match by {
         ..0 => ("‹", "Previous section", "Cuts along the previous wire ([)."),
         _ => ("›", "Next section", "Cuts along the next wire (])."),
     };
-    let stepped = choice.stepped(by, test);
+    let stepped = choice.stepped(by, skin);
     let arrow = ui.add_enabled(stepped.is_some(), Button::new(text).min_size(Vec2::splat(space(6))));
     arrow.widget_info(|| WidgetInfo::labeled(Role::Button, stepped.is_some(), name));
     if arrow.on_hover_text(hint).clicked() {

@@ -1,68 +1,40 @@
-//! The surfaces of the Train view, or all displayed targets of the sample if a recording has no surfaces.
+//! The surfaces of the Train view.
 
 use decoupler_files::{
     export::format_number,
     figure::{
-        Figure, TargetSurface,
+        TargetSurface,
         surface::{Surface, SurfaceFigure},
     },
 };
-use eframe::egui::{Align, Color32, Layout, Rect, RichText, Ui, Vec2};
+use eframe::egui::{Align, Color32, Layout, Rect, RichText, Ui};
 use glam::DVec2;
 
 use super::{
-    charts::{SAMPLE, SECTION, has_target_surface, lit_nodes},
-    press::{Hand, Shown},
+    charts::{SECTION, lit_nodes},
+    press::Shown,
     view::TrainView,
 };
 use crate::window::{
-    shared::{Effect, Phase, RightCard, Shared, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
-    surface_view::{ColourBar, SurfaceView},
-    test_view::{Drawing, Positions},
+    shared::{Effect, RightCard, Shared, surface_cards_ui, surface_ui, view_mode_ui},
+    surface_view::SurfaceView,
+    test_view::Drawing,
     theme::{Theme, semibold, space, type_size},
-    widgets::{card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
+    widgets::{dim_ui, placeholder_ui, segmented_ui},
 };
 
-/// Work of the pointer on the actual surface.
-const HANDS: [(Hand, &str, &str); 2] = [
-    (
-        Hand::Press,
-        "Press",
-        "Drag on the surface to press it; the wheel sets the depth. Drag with Shift or another button to move the picture, \
-         and the surface next to it to turn it.",
-    ),
-    (Hand::Turn, "Turn", "Drag to turn the surface; the wheel zooms."),
-];
-
-/// Both surfaces side by side with their colour scale; all targets of the sample if a recording has no surfaces.
+/// Both surfaces side by side with their colour scale.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
-    if shared.source == SourceKind::Recording && !has_target_surface(shared) {
-        card_ui(ui, rect, |ui| sample_card_ui(ui, view, shared));
-        return;
-    }
-    let gap = space(2);
-    let (cards, scales) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
-    let width = 0.5 * (cards.width() - gap);
-    let left = cards.with_max_x(cards.left() + width);
-    let right = cards.with_min_x(left.right() + gap);
     let figure = surface_figure(view, shared);
-    for (card, place) in [left, right].into_iter().zip([Place::Actual, Place::Network]) {
-        card_ui(ui, card, |ui| {
-            head_ui(ui, place, view, shared, effects);
-            match figure.surfaces.get(place as usize) {
-                Some(surface) => surface_ui(ui, (surface, &figure), place, view, shared, effects),
-                None if place == Place::Network => invitation_ui(ui, view, shared),
-                None => {}
-            }
-        });
-    }
-    let (parts, note) = (figure.scales(), figure.note());
-    let part = scales.height() / parts.len().max(1) as f32;
-    for (index, scale) in parts.iter().enumerate() {
-        let top = scales.top() + part * index as f32;
-        let slot = Rect::from_x_y_ranges(scales.x_range(), top..=top + part).shrink2(Vec2::new(0.0, space(4)));
-        colour_scale_ui(ui, slot, scale, &note, shared.look, effects);
-    }
+    surface_cards_ui(ui, (rect, 2), &figure, shared.look, effects, |ui, index, effects| {
+        let place = [Place::Actual, Place::Network][index];
+        head_ui(ui, place, view, shared, effects);
+        match figure.surfaces.get(index) {
+            Some(surface) => side_ui(ui, (surface, &figure), place, view, shared, effects),
+            None if place == Place::Network => invitation_ui(ui, view, shared),
+            None => {}
+        }
+    });
 }
 
 /// Returns the displayed surfaces of the snapshot: the actual one, and the one of the network if there is one.
@@ -84,17 +56,14 @@ pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
             None => Some(item),
         }),
         lit_nodes: lit_nodes(view, shared),
-        section: shared.test().filter(|_| is_cut).map(|test| view.section.section(test)),
+        section: shared.skin().filter(|_| is_cut).map(|skin| view.section.section(skin)),
     }
     .with_common_scales()
 }
 
 /// The surface through the targets of a recording.
 fn through(shared: &Shared) -> Option<&TargetSurface> {
-    match &shared.recorded_test()?.positions {
-        Positions::Surface(through) => Some(through),
-        _ => None,
-    }
+    shared.test()?.through()
 }
 
 /// Returns the item at a node of a surface: the node itself, or the target there.
@@ -115,8 +84,8 @@ enum Place {
 /// The title of a card, if the options next to it leave room for it, and the options.
 fn head_ui(ui: &mut Ui, place: Place, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     let (title, note, options_width) = match place {
-        Place::Actual if view.press.is_pressing() => ("Actual", Some("pressed".to_owned()), space(56)),
-        Place::Actual => ("Actual", None, space(56)),
+        Place::Actual if view.press.is_pressing() => ("Actual", Some("pressed".to_owned()), space(36)),
+        Place::Actual => ("Actual", None, space(36)),
         Place::Network => ("Network", view.press.shown().and_then(Shown::network_time), space(36)),
     };
     ui.horizontal(|ui| {
@@ -132,14 +101,7 @@ fn head_ui(ui: &mut Ui, place: Place, view: &mut TrainView, shared: &Shared, eff
             }
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| match place {
-            Place::Actual => {
-                view_mode_ui(ui, shared.look, effects);
-                // Only sources with a sensor model can be pressed.
-                if shared.source == SourceKind::Array {
-                    let picked = explained_options_ui(ui, "Pointer on the surface", &HANDS, view.press.hand, false);
-                    view.press.hand = picked.unwrap_or(view.press.hand);
-                }
-            }
+            Place::Actual => view_mode_ui(ui, shared.look, effects),
             Place::Network => {
                 let options = [(RightCard::Decoupled, "Decoded"), (RightCard::Error, "Error")];
                 let picked = segmented_ui(ui, "Network card", &options, view.right, false);
@@ -150,7 +112,7 @@ fn head_ui(ui: &mut Ui, place: Place, view: &mut TrainView, shared: &Shared, eff
 }
 
 /// The invitation on a card without a network: to press, which a small network answers, or to train.
-fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+fn invitation_ui(ui: &mut Ui, view: &TrainView, shared: &Shared) {
     let text = if view.press.is_pressing() {
         view.press.waiting_text(shared)
     } else if shared.phase.is_busy() {
@@ -160,18 +122,9 @@ fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
          its surface take shape here."
     };
     placeholder_ui(ui, text);
-    if let Some(test) = shared.test().filter(|_| !view.press.is_pressing()) {
-        ui.vertical_centered(|ui| {
-            ui.add_space(space(3));
-            let hint = "Presses a ball onto the middle of the surface.";
-            if ui.add(ghost_button("Press it")).on_hover_text(hint).clicked() {
-                view.press.press_middle(test);
-            }
-        });
-    }
 }
 
-fn surface_ui(
+fn side_ui(
     ui: &mut Ui,
     (surface, figure): (&Surface, &SurfaceFigure),
     place: Place,
@@ -179,38 +132,34 @@ fn surface_ui(
     shared: &Shared,
     effects: &mut Vec<Effect>,
 ) {
-    let (array, look, theme) = (shared.test(), shared.look, Theme::of(ui));
+    let (array, look) = (shared.skin(), shared.look);
+    // Only sources with a sensor model can be pressed.
+    let is_touched = place == Place::Actual && array.is_some();
     let surface_view = SurfaceView {
         label: &format!("{} surface", surface.title),
         surface,
-        marked_node: figure.marked_node,
-        lit_nodes: &figure.lit_nodes,
-        section: figure.section.as_ref(),
-        theme,
+        figure,
+        is_touched,
     };
-    let is_touched = place == Place::Actual && view.press.hand == Hand::Press && array.is_some();
-    let shown = match is_touched {
-        true => surface_view.show_touched(ui, look.camera),
-        false => surface_view.show(ui, look.camera),
-    };
+    let mut marked = figure.marked_node;
+    let shown = surface_ui(ui, surface_view, look, &mut marked, effects);
     let response = &shown.response;
-    if let (Place::Actual, Some(test)) = (place, array) {
+    if let (Place::Actual, Some(skin)) = (place, array) {
         view.press.take_target(&shown, surface);
         let (painter, pointer) = (ui.painter(), response.hover_pos());
-        view.press.outline_ui(painter, &theme.palette, pointer, test.stroke_mm);
+        view.press
+            .outline_ui(painter, &Theme::of(ui).palette, pointer, skin.stroke_mm);
     }
-    let mut marked = figure.marked_node;
-    follow_surface(&shown, look, &mut marked, effects);
     if marked != figure.marked_node {
         view.lights.node = marked.and_then(|node| item_at(shared, node));
     }
     // A pressed surface is cut too.
     let is_chosen = response.clicked() || (is_touched && response.is_pointer_button_down_on());
-    if let (true, Some(test)) = (is_chosen && figure.section.is_some(), array)
+    if let (true, Some(skin)) = (is_chosen && figure.section.is_some(), array)
         && let (Some(at), Some(sight)) = (response.interact_pointer_pos(), shown.sight)
         && let Some(place) = surface.pick(&sight.ray(DVec2::new(f64::from(at.x), f64::from(at.y))))
     {
-        view.section.choose_at(place.truncate(), test);
+        view.section.choose_at(place.truncate(), skin);
     }
     shown.node_tooltip_ui(|ui, node| {
         if let Some(drawing) = view.drawing() {
@@ -221,10 +170,10 @@ fn surface_ui(
 
 /// The node under the pointer and its values, in two lines that hide little.
 fn node_values_ui(ui: &mut Ui, drawing: &Drawing, shared: &Shared, node: usize) {
-    let target = || shared.recorded_test()?.problem.targets.get(item_at(shared, node)?);
-    let (title, [name, found], unit) = if let Some(test) = shared.test() {
-        let per_row = test.sensor.scale.nodes_per_row();
-        let row = test.rows.get(node / per_row).map_or(0, |row| row + 1);
+    let target = || shared.test()?.problem.targets.get(item_at(shared, node)?);
+    let (title, [name, found], unit) = if let Some(skin) = shared.skin() {
+        let per_row = skin.sensor.scale.nodes_per_row();
+        let row = skin.rows.get(node / per_row).map_or(0, |row| row + 1);
         let title = format!("Row {row}, node {}", node % per_row + 1);
         (title, ["z", "decoded"], " mm".to_owned())
     } else if let Some(target) = target() {
@@ -248,34 +197,4 @@ fn node_values_ui(ui: &mut Ui, drawing: &Drawing, shared: &Shared, node: usize) 
         text += &format!(", {found} {decoded}{unit}, error {error}{unit}");
     }
     ui.label(RichText::new(text).size(type_size().note));
-}
-
-/// All displayed targets of the sample, actual next to decoded.
-fn sample_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
-    let Some(figure) = SAMPLE.figure(view, shared) else {
-        let text = match shared.phase {
-            Phase::Preparing => "The recording is being read; the first epoch follows.",
-            _ => "Press Train: the targets of each test sample appear here, actual next to decoded.",
-        };
-        return placeholder_ui(ui, text);
-    };
-    ui.horizontal(|ui| {
-        ui.set_min_height(space(7));
-        let title = format!("Test sample {}", view.snapshot + 1);
-        ui.label(RichText::new(title).font(semibold(type_size().title)));
-    });
-    if let Some(Positions::NoSurface(reason)) = shared.recorded_test().map(|test| &test.positions) {
-        let text = format!("No surface goes through the positions of the targets: {reason}.");
-        dim_ui(ui, &text);
-    }
-    SAMPLE.figure_ui(ui, &figure, view, shared);
-}
-
-/// Returns the figure above the charts: the surfaces, or all targets of a sample.
-pub(super) fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
-    let surfaces = surface_figure(view, shared);
-    match SAMPLE.figure(view, shared) {
-        Some(targets) if surfaces.surfaces.is_empty() => targets,
-        _ => surfaces.into(),
-    }
 }

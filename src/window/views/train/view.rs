@@ -1,30 +1,29 @@
 use std::sync::Arc;
 
-use decoupler_core::{text::counted, training::StopReason};
-use decoupler_files::import::Setup;
+use decoupler_core::{dataset::Dataset, text::counted};
 use eframe::egui::{Sense, Ui};
 use ndarray::Array2;
 
 use super::{
-    charts::{charts_card_ui, readings_of_view_ui},
+    charts::{answers_ui, charts_card_ui, readings_of_view_ui},
     configuration::configuration_ui,
     decoders::Decoders,
-    drawn::Drawn,
-    exports::{PaperFigure, shown},
+    exports::shown,
     press::{PressState, readings_head_ui},
     recording::{RecordingEditor, recipe_task},
-    report,
+    report::{self, OLD},
     scrub::ScrubState,
     section::SectionChoice,
     surfaces::surfaces_ui,
 };
 use crate::window::{
     job::Wake,
+    plotting::SeriesView,
     shared::{
-        Command, Effect, Holdings, Look, MIN_WIDTH_FOR_REPORT, Offers, Phase, RightCard, RunResult, RunView, Shared,
-        Shown, SourceKind, Status, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, NetworkSource, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind,
+        Status, Unfinished, View, run_buttons_ui,
     },
-    test_view::{Drawing, RecordedTest},
+    test_view::{Drawing, TestView},
     theme::space,
     widgets::{card_ui, snapshot_ui},
 };
@@ -32,7 +31,7 @@ use crate::window::{
 impl View for TrainView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
-        self.decoders.follow(shared);
+        self.decoders.follow_training(shared);
         self.scrub.follow(shared, effects);
     }
 
@@ -54,7 +53,8 @@ impl View for TrainView {
         if offers.is_heard {
             let lit = self.lights.node;
             let lit = lit.and_then(|node| self.drawing()?.actual.nodes.get(node).copied());
-            self.press.take_pointer(offers.ctx, shared.test(), lit);
+            self.press
+                .take_pointer(offers.ctx, shared.skin().map(|skin| &**skin), lit);
             self.follow(shared);
         }
         let phase = shared.phase;
@@ -76,13 +76,19 @@ impl View for TrainView {
         if offers.offer(Command::OpenFiles, !phase.is_busy()) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
-        if shared.source == SourceKind::Array
-            && offers.offer(Command::PressMiddle, shared.test().is_some())
-            && let Some(test) = shared.test()
+        let ended = shared.shown_run().filter(|run| run.stop_reason.is_some());
+        if offers.offer(Command::DecodeFile, ended.is_some())
+            && let Some(run) = ended
         {
-            self.press.press_middle(test);
+            effects.push(Effect::ChooseFile(NetworkSource::of(run).decode()));
         }
-        let has_next = self.snapshot + 1 < Self::snapshots(shared);
+        if let Some(skin) = shared.skin()
+            && offers.offer(Command::PressMiddle, true)
+        {
+            self.press.press_middle(skin);
+        }
+        let snapshots = shared.test().map_or(0, TestView::snapshots);
+        let has_next = self.snapshot + 1 < snapshots;
         if offers.offer(Command::NextSample, has_next) {
             self.show_snapshot(self.snapshot + 1);
         }
@@ -93,15 +99,19 @@ impl View for TrainView {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        run_buttons_ui(ui, shared, effects);
-        ui.add_space(space(4));
         let what = match shared.source {
             SourceKind::Array => "snapshot",
             SourceKind::Recording => "sample",
         };
-        if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, Self::snapshots(shared)) {
-            self.show_snapshot(snapshot);
+        let snapshots = shared.test().map_or(0, TestView::snapshots);
+        // In a very narrow window the keys remain.
+        if ui.ctx().content_rect().width() >= 800.0 {
+            if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, snapshots) {
+                self.show_snapshot(snapshot);
+            }
+            ui.add_space(space(4));
         }
+        run_buttons_ui(ui, shared, effects);
     }
 
     fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
@@ -111,9 +121,7 @@ impl View for TrainView {
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        if let Some(figure) = configuration_ui(ui, &mut self.recording, shared, effects) {
-            self.show_paper_figure(figure, shared, effects);
-        }
+        configuration_ui(ui, &mut self.recording, shared, effects);
     }
 
     fn report_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -141,6 +149,19 @@ pub struct Lighting {
     pub row: Option<usize>,
 }
 
+/// A test set, the outputs of the network on it, and a snapshot.
+type DrawnOf = (Arc<Dataset>, Option<Arc<Array2<f64>>>, usize);
+
+/// What is drawn of a snapshot of the test set, until it, the result or the snapshot changes.
+#[derive(Debug, Default)]
+struct Drawn {
+    of: Option<DrawnOf>,
+    /// Surfaces; `None` where none goes through the targets of a recording.
+    surfaces: Option<Drawing>,
+    /// Drops of its readings below those at rest, in percent: rows read × M4.
+    drops_percent: Option<Array2<f64>>,
+}
+
 /// The Train view.
 #[derive(Debug)]
 pub struct TrainView {
@@ -150,8 +171,11 @@ pub struct TrainView {
     pub(super) target: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
-    /// Name of the chart below.
+    /// Name of the chart below, and of that of the answers for a recording.
     pub tab: &'static str,
+    pub(super) upper: &'static str,
+    /// The part of the values over time in view.
+    pub(super) series: SeriesView,
     /// Item lit by the pointer, in every picture.
     pub lights: Lighting,
     /// The wire along which the surfaces are cut.
@@ -159,7 +183,7 @@ pub struct TrainView {
     /// True if each decoded node has an error bar of its root mean square error.
     pub has_error_bars: bool,
     /// Drawings of the test set.
-    pub drawn: Drawn,
+    drawn: Drawn,
     /// The finger on the actual surface.
     pub press: PressState,
     /// The displayed past epoch.
@@ -178,6 +202,8 @@ impl TrainView {
             target: 0,
             right: RightCard::default(),
             tab: "Loss",
+            upper: "",
+            series: SeriesView::default(),
             lights: Lighting::default(),
             section: SectionChoice::default(),
             has_error_bars: false,
@@ -185,14 +211,14 @@ impl TrainView {
             press: PressState::new(&wake),
             scrub: ScrubState::new(Arc::clone(&wake)),
             recording: RecordingEditor::new(&wake),
-            decoders: Decoders::new(wake),
+            decoders: Decoders::new(wake, &[]),
         }
     }
 
     /// Shows both surfaces above, the charts below, and next to them the readings of an array. In a narrow window, the report
     /// takes the place of the readings, so that the surfaces keep their width.
     fn workbench_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let is_narrow = ui.ctx().content_rect().width() < MIN_WIDTH_FOR_REPORT;
+        let is_narrow = !shared.has_report(ui.ctx().content_rect().width());
         let whole = ui.available_rect_before_wrap();
         let gap = space(2);
         let (share, least) = if is_narrow {
@@ -202,8 +228,19 @@ impl TrainView {
         };
         let lower_height = (share * whole.height()).clamp(least, space(75));
         let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-        surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), self, shared, effects);
+        let upper = upper.with_max_y(upper.max.y - gap);
         let has_sensor = shared.source == SourceKind::Array;
+        let is_old = shared.shown_run().is_some_and(|run| shared.is_old(run));
+        let opacity = if is_old { OLD } else { 1.0 };
+        match has_sensor {
+            true => surfaces_ui(ui, upper, self, shared, effects),
+            false => {
+                ui.scope(|ui| {
+                    ui.multiply_opacity(opacity);
+                    answers_ui(ui, upper, self, shared, effects);
+                });
+            }
+        }
         let width = match is_narrow {
             true => (0.45 * lower.width()).clamp(space(82), space(96)),
             false => (0.4 * lower.width()).floor(),
@@ -221,19 +258,33 @@ impl TrainView {
             charts = lower;
         }
         let has_readings = is_narrow && has_sensor;
-        card_ui(ui, charts, |ui| charts_card_ui(ui, self, shared, has_readings, effects));
+        card_ui(ui, charts, |ui| {
+            ui.multiply_opacity(opacity);
+            charts_card_ui(ui, self, shared, has_readings);
+        });
         ui.allocate_rect(whole, Sense::hover());
     }
 
-    /// Draws what is displayed.
+    /// Draws what is displayed, at the nearest snapshot that there is.
     fn follow(&mut self, shared: &Shared) {
-        let result = self.scrub.shown(shared);
-        let target = shared.recorded_test().map_or(0, |test| self.target_of(test));
-        self.snapshot = self.drawn.follow(shared, result, self.snapshot, target);
+        let (test, result) = (shared.test(), self.scrub.shown(shared));
         self.press.follow(shared, result);
-        let of_recording = shared.recorded_test().map(|test| test.set.outputs());
-        let items = of_recording.unwrap_or(self.drawing().map_or(0, |drawing| drawing.actual.nodes.len()));
-        self.lights.node = self.lights.node.filter(|&item| item < items);
+        self.snapshot = self
+            .snapshot
+            .min(test.map_or(0, |test| test.snapshots().saturating_sub(1)));
+        let answers = result.map(|result| &result.answers);
+        let of = test.map(|test| (Arc::clone(&test.set), answers.cloned(), self.snapshot));
+        let key = |of: &Option<DrawnOf>| {
+            let (set, answers, snapshot) = of.as_ref()?;
+            Some((Arc::as_ptr(set), answers.as_ref().map(Arc::as_ptr), *snapshot))
+        };
+        if key(&of) != key(&self.drawn.of) {
+            self.drawn = Drawn {
+                surfaces: test.and_then(|test| test.drawing(answers.map(|answers| &**answers), self.snapshot)),
+                drops_percent: test.and_then(|test| test.skin.as_ref()?.drops_percent(&test.set, self.snapshot)),
+                of,
+            };
+        }
     }
 
     /// Returns the current result: that of the training so far, or of the displayed past epoch.
@@ -267,33 +318,9 @@ impl TrainView {
         self.lights.node = node;
     }
 
-    /// Returns the number of snapshots of the current test set: frames of an array, samples of a recording.
-    fn snapshots(shared: &Shared) -> usize {
-        let of_recording = || shared.recorded_test().map(|test| test.set.samples());
-        let of_array = shared.test().map(|test| test.snapshots.len());
-        of_array.or_else(of_recording).unwrap_or(0)
-    }
-
-    /// Returns the target of `test` whose values the charts show: the one chosen, or the last.
-    pub(super) fn target_of(&self, test: &RecordedTest) -> usize {
-        self.target.min(test.set.outputs().saturating_sub(1))
-    }
-
-    /// Displays a figure of the paper, and trains its network unless that is the current one.
-    fn show_paper_figure(&mut self, figure: PaperFigure, shared: &Shared, effects: &mut Vec<Effect>) {
-        let settings = figure.settings();
-        effects.push(Effect::Configure(Box::new(settings)));
-        self.right = RightCard::Decoupled;
-        self.tab = figure.chart.unwrap_or(self.tab);
-        if let Some(mode) = figure.mode {
-            effects.push(Effect::Look(Look { mode, ..shared.look }));
-        }
-        let is_complete = |run: &RunView| {
-            let was_stopped = run.stop_reason == Some(StopReason::Stopped);
-            run.asked == Setup::from(settings) && run.stop_reason.is_some() && !was_stopped
-        };
-        if !shared.run.as_ref().is_some_and(is_complete) {
-            effects.push(Effect::Train);
-        }
+    /// Returns the target whose values the charts show: the one chosen, or the last; none for the nodes of an array.
+    pub(super) fn target_of(&self, test: &TestView) -> Option<usize> {
+        let last = test.problem.targets.len().saturating_sub(1);
+        test.skin.is_none().then(|| self.target.min(last))
     }
 }

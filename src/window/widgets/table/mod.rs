@@ -83,8 +83,6 @@ pub enum TableClick {
     Sort(SortBy),
     /// Row with this index selected.
     Select(usize),
-    /// Row with this index opened by a double click.
-    Open(usize),
 }
 
 /// Table widget.

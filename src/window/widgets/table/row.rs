@@ -109,7 +109,7 @@ impl<'a> TableRow<'a> {
         self
     }
 
-    /// Adds a small warning mark with this meaning after the first text; empty for none.
+    /// Gives the first text the colour of warnings, with this meaning; empty for none.
     pub fn mark(self, mark: &'a str) -> Self {
         Self { mark, ..self }
     }

@@ -1,7 +1,7 @@
 //! Layout and painting of a table.
 
 use eframe::egui::{
-    Align, Align2, AsIdSalt, Color32, CursorIcon, FontId, Layout, Rangef, Rect, ScrollArea, Sense, Shape, Stroke,
+    Align, Align2, AsIdSalt, Color32, CursorIcon, FontId, Layout, Rangef, Rect, ScrollArea, Sense, Stroke,
     TextWrapMode, Ui, UiBuilder, WidgetInfo, WidgetText, accesskit::Role, pos2, vec2,
 };
 
@@ -23,9 +23,8 @@ const MAX_GAPS: [f32; 2] = [space(4), space(8)];
 const MIN_REST: f32 = space(24);
 /// Width of the arrow of a sorted column.
 const ARROW: f32 = space(2);
-/// Width of the dot before a text with its distance from it, and of the mark after a text.
+/// Width of the dot before a text with its distance from it.
 const DOT_WIDTH: f32 = space(3);
-const MARK_WIDTH: f32 = space(3);
 
 impl TableView<'_> {
     /// Shows all `rows` over the available width, without vertical scrolling.
@@ -111,29 +110,40 @@ impl<'a> Lines<'a> {
             .id_salt(self.table.id)
             .auto_shrink([false, !self.fills])
             .animated(false);
-        let scrolled = scroll.show_viewport(ui, |ui, viewport| {
-            let (whole, _) = ui.allocate_exact_size(size, Sense::hover());
-            let mut view = viewport.translate(whole.min.to_vec2());
-            if !self.fills {
-                // All rows are laid out; an enclosing area scrolls vertically.
-                view = Rect::from_x_y_ranges(view.x_range(), whole.y_range());
-            }
-            let line_at = |y: f32| Rect::from_min_size(pos2(whole.left(), y), vec2(self.width, height));
-            let mut click = self.head_ui(ui, line_at(view.top()));
-            let (clip, id) = (ui.clip_rect(), ui.scope_id().with(self.table.id));
-            let body = clip.with_min_y(clip.top().max(view.top() + height));
-            let first = ((view.top() - whole.top()) / height).max(0.0).floor() as usize;
-            let last = (((view.bottom() - whole.top()) / height - 1.0).max(0.0).ceil() as usize).min(rows);
-            for place in first..last {
-                let line = line_at(whole.top() + (place + 1) as f32 * height);
-                let mut line_ui = ui.new_child(UiBuilder::new().max_rect(line).scope_id(id.with(place)));
-                line_ui.set_clip_rect(body);
-                let is_last = place + 1 == rows;
-                click = click.or(self.line_ui(&mut line_ui, place, is_last, row(place)));
-            }
-            click
+        let table = UiBuilder::new().accessibility_role(Role::Table);
+        let scrolled = ui.scope_builder(table, |ui| {
+            scroll.show_viewport(ui, |ui, viewport| {
+                let (whole, _) = ui.allocate_exact_size(size, Sense::hover());
+                let mut view = viewport.translate(whole.min.to_vec2());
+                if !self.fills {
+                    // All rows are laid out; an enclosing area scrolls vertically.
+                    view = Rect::from_x_y_ranges(view.x_range(), whole.y_range());
+                }
+                let line_at = |y: f32| Rect::from_min_size(pos2(whole.left(), y), vec2(self.width, height));
+                let mut click = self.head_ui(ui, line_at(view.top()));
+                let (clip, id) = (ui.clip_rect(), ui.scope_id().with(self.table.id));
+                let body = clip.with_min_y(clip.top().max(view.top() + height));
+                let first = ((view.top() - whole.top()) / height).max(0.0).floor() as usize;
+                let last = (((view.bottom() - whole.top()) / height - 1.0).max(0.0).ceil() as usize).min(rows);
+                for place in first..last {
+                    let line = line_at(whole.top() + (place + 1) as f32 * height);
+                    let row = row(place);
+                    // A row with a label is a control.
+                    let role = if row.label.is_empty() {
+                        Role::Row
+                    } else {
+                        Role::GenericContainer
+                    };
+                    let builder = UiBuilder::new().max_rect(line).accessibility_role(role);
+                    let mut line_ui = ui.new_child(builder.scope_id(id.with(place)));
+                    line_ui.set_clip_rect(body);
+                    let is_last = place + 1 == rows;
+                    click = click.or(self.line_ui(&mut line_ui, place, is_last, row));
+                }
+                click
+            })
         });
-        scrolled.inner
+        scrolled.inner.inner
     }
 
     /// Shows the header. Returns the sort order that the user chose with it.
@@ -195,7 +205,7 @@ impl<'a> Lines<'a> {
             }
             return click;
         }
-        for (place, (column, cell)) in self.table.columns.iter().zip(row.cells).enumerate() {
+        for (place, (column, mut cell)) in self.table.columns.iter().zip(row.cells).enumerate() {
             let mut rect = self.cell(line, place);
             if let Some(controls) = cell.controls {
                 let layout = match column.is_figure {
@@ -225,20 +235,19 @@ impl<'a> Lines<'a> {
                     rect.min.x += DOT_WIDTH;
                 }
                 if !row.mark.is_empty() {
-                    rect.max.x -= MARK_WIDTH;
+                    cell.colour = Some(Theme::of(ui).palette.warning);
+                    meaning = row.mark;
+                    label_ui(ui, whole, "mark", row.mark, "");
                 }
                 if meaning.is_empty() && row.label.is_empty() {
                     meaning = row.meaning;
                 }
             }
-            let (text, is_cut) = text_ui(ui, rect, column.is_figure, &cell, self.size);
+            let is_cut = text_ui(ui, rect, column.is_figure, &cell, self.size);
             if meaning.is_empty() && is_cut {
                 meaning = &cell.text;
             }
             label_ui(ui, whole, ("cell", place), &label, meaning);
-            if place == 0 && !row.mark.is_empty() {
-                mark_ui(ui, text, row.mark);
-            }
         }
         click
     }
@@ -269,11 +278,7 @@ impl<'a> Lines<'a> {
                     ui.scroll_to_rect(line.expand2(vec2(0.0, line.height())), None);
                 }
                 response = response.on_hover_cursor(CursorIcon::PointingHand);
-                click = match (response.double_clicked(), response.clicked()) {
-                    (true, _) => Some(TableClick::Open(place)),
-                    (false, true) => Some(TableClick::Select(place)),
-                    (false, false) => None,
-                };
+                click = response.clicked().then_some(TableClick::Select(place));
             }
         }
         if !is_last {
@@ -295,8 +300,7 @@ fn min_widths(table: &TableView<'_>, ui: &Ui, rows: &[TableRow<'_>], size: f32) 
         let cells = rows.filter_map(|row| Some((row, row.cells.get(place)?)));
         let widths = cells.map(|(row, cell)| {
             let dot = if row.dot.is_some() { DOT_WIDTH } else { 0.0 };
-            let mark = if row.mark.is_empty() { 0.0 } else { MARK_WIDTH };
-            width(&cell.text, font(size, cell.is_strong)) + if place == 0 { dot + mark } else { 0.0 }
+            width(&cell.text, font(size, cell.is_strong)) + if place == 0 { dot } else { 0.0 }
         });
         widths.fold(0.0, f32::max)
     };
@@ -328,7 +332,7 @@ fn label_ui(ui: &Ui, rect: Rect, id: impl AsIdSalt, label: &str, meaning: &str) 
     }
     let response = ui.interact(rect, ui.scope_id().with(id), Sense::hover());
     if !label.is_empty() {
-        response.widget_info(|| WidgetInfo::labeled(Role::Label, true, label));
+        response.widget_info(|| WidgetInfo::labeled(Role::Cell, true, label));
     }
     if !meaning.is_empty() {
         response.on_hover_text(meaning);
@@ -336,16 +340,16 @@ fn label_ui(ui: &Ui, rect: Rect, id: impl AsIdSalt, label: &str, meaning: &str) 
 }
 
 /// Paints the text of a cell: a figure is aligned right and never truncated; text is aligned left and truncated to fit.
-/// Returns where it is, and true if it was truncated.
-fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32) -> (Rect, bool) {
+/// Returns true if it was truncated.
+fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32) -> bool {
     let (font, colour) = (
         font(size, cell.is_strong),
         cell.colour.unwrap_or(Theme::of(ui).palette.text),
     );
     if is_figure {
         let right = rect.right_center();
-        let place = ui.painter().text(right, Align2::RIGHT_CENTER, &cell.text, font, colour);
-        return (place, false);
+        ui.painter().text(right, Align2::RIGHT_CENTER, &cell.text, font, colour);
+        return false;
     }
     let text = WidgetText::from(cell.text.as_str());
     // The width was measured from the same text, but positions are rounded.
@@ -355,17 +359,5 @@ fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32
         galley.elided,
     );
     ui.painter().galley(place.min, galley, colour);
-    (place, is_cut)
-}
-
-/// Paints a small upward-pointing triangle after a text.
-fn mark_ui(ui: &Ui, text: Rect, meaning: &str) {
-    let centre = text.right_center() + vec2(0.5 * MARK_WIDTH + 1.0, 0.0);
-    let half = 0.25 * MARK_WIDTH;
-    let corners = [vec2(0.0, -half), vec2(half, 0.8 * half), vec2(-half, 0.8 * half)].map(|corner| centre + corner);
-    let colour = Theme::of(ui).palette.warning;
-    ui.painter()
-        .add(Shape::convex_polygon(corners.into(), colour, Stroke::NONE));
-    let rect = Rect::from_center_size(centre, vec2(MARK_WIDTH, MARK_WIDTH));
-    label_ui(ui, rect, "mark", meaning, meaning);
+    is_cut
 }

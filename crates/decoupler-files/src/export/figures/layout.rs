@@ -40,9 +40,13 @@ const SAMPLE: f32 = 22.0;
 fn draw_plots(figure: &PlotFigure) -> Picture {
     let is_square = matches!(&figure.plots[..], [plot] if plot.has_equal_scales);
     let width = if is_square { SQUARE_WIDTH } else { PAGE_WIDTH };
-    let slot = width / figure.plots.len().max(1) as f32;
-    let plot_width = slot - LEFT - RIGHT;
+    let (count, is_stacked) = (figure.plots.len().max(1) as f32, figure.is_stacked);
+    let plot_width = if is_stacked { width } else { width / count } - LEFT - RIGHT;
     let plot_height = if is_square { plot_width } else { PLOT_HEIGHT };
+    let next = match is_stacked {
+        true => Vec2::new(0.0, plot_height + BOTTOM),
+        false => Vec2::new(plot_width + LEFT + RIGHT, 0.0),
+    };
     let (mut shapes, mut at) = (Vec::new(), Vec2::new(LEFT, 0.5 * LINE));
     for (name, look) in figure.keys() {
         let text = measure(name).x;
@@ -62,11 +66,12 @@ fn draw_plots(figure: &PlotFigure) -> Picture {
     }
     top += 12.0;
     let plots = figure.plots.iter().enumerate().flat_map(|(index, plot)| {
-        let corner = Vec2::new(slot * index as f32 + LEFT, top);
+        let corner = Vec2::new(LEFT, top) + index as f32 * next;
         lay_out(plot, Bounds::of_size(corner, Vec2::new(plot_width, plot_height)))
     });
     let layers = std::iter::once((None, shapes)).chain(plots);
-    Picture::new(Vec2::new(width, top + plot_height + BOTTOM), &Vec::from_iter(layers))
+    let height = top + plot_height + BOTTOM + (count - 1.0) * next.y;
+    Picture::new(Vec2::new(width, height), &Vec::from_iter(layers))
 }
 
 /// Lays the plot out within `area`; names and numbers are outside it.
@@ -86,6 +91,13 @@ fn lay_out(plot: &Plot, area: Bounds) -> [Layer; 2] {
     }
     behind.extend(axes(plot, area, ranges));
     for series in &plot.series {
+        if series.form == Form::Band {
+            shapes.extend(plot.bands(series).iter().flat_map(|band| band.windows(2)).map(|ends| {
+                let [from, to] = [ends[0], ends[1]];
+                let corners = [[from[0], from[1]], [from[0], from[2]], [to[0], to[2]], [to[0], to[1]]];
+                Shape::Area(corners.map(at).to_vec(), series.look.ink.at(0.2))
+            }));
+        }
         let Form::Bars(width) = series.form else { continue };
         for (_, [x, y]) in plot.placed(series) {
             let [left, right] = [-0.5, 0.5].map(|half| at([x + half * width, y]));
@@ -103,7 +115,7 @@ fn lay_out(plot: &Plot, area: Bounds) -> [Layer; 2] {
             let stretches = stretches.map(|places| places.into_iter().map(at).collect());
             shapes.extend(stretches.map(|points| Shape::Line(points, style.stroke(look.ink))));
         }
-        for (point, [x, _]) in plot.placed(series) {
+        for (point, [x, _]) in plot.placed(series).filter(|_| series.form == Form::Points) {
             let Some(ends) = point.bar else { continue };
             let [low, high] = plot.bar_ends(ends, y_range).map(|end| at([x, end]));
             let cap = Vec2::new(3.0, 0.0);

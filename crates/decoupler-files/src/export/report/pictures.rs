@@ -65,7 +65,7 @@ pub(super) fn pictures(
         let line = RegressionLine::of(pairs.iter().copied());
         let point = |pair: usize| pairs[pair];
         add(regression, regression_figure((pairs.len(), &point), &line, of));
-        add(histogram, histogram_figure(&pairs, None, of));
+        add(histogram, histogram_figure(&pairs, of));
     }
     // An array has no loops.
     for (target, found) in targets().zip(loops) {

@@ -1,30 +1,34 @@
 //! Pressing: the user's finger on the actual surface, and the answers of all decoders.
 //!
 //! `pointer` turns mouse and keys into a [`Touch`] before anything of the frame is drawn. `solving` computes what is shown of
-//! it in the background, the newest first; `decoders` asks the other decoders, and trains a small network that answers until
-//! there is another. `section` shows the answers.
+//! it in the background, the newest first; `demo` trains a small network that answers until there is another. `section` shows
+//! the answers.
 
-mod decoders;
+mod demo;
 mod pointer;
 mod section;
 mod solving;
 
 use std::sync::Arc;
 
-use decoupler_core::scene::{Indenter, IndenterShape, Radii};
+use decoupler_core::{
+    decoupling::DecoderKind,
+    scene::{Indenter, IndenterShape, Radii},
+};
 use decoupler_files::figure::surface::{Sight, Surface};
 use eframe::egui::{Id, Rect};
 use glam::DVec2;
 
 use self::{
-    decoders::{Comparison, Demo},
-    solving::{Question, Subject, solve},
+    demo::Demo,
+    solving::{Question, solve},
 };
+use super::decoders::{Decoders, Subject};
 use crate::window::{
     job::{Background, JobError, Wake},
     shared::{RunResult, Shared},
     surface_view::SurfaceViewResponse,
-    test_view::TestView,
+    test_view::Skin,
 };
 
 pub use section::{press_section_ui, readings_head_ui, readings_ui};
@@ -33,8 +37,6 @@ pub use solving::Shown;
 /// The finger, what it presses, and everything known about that.
 #[derive(Debug)]
 pub struct PressState {
-    /// Work of the pointer on the actual surface.
-    pub hand: Hand,
     /// The finger that presses.
     pub finger: Finger,
     /// Place that it presses; `None` while the test set is displayed.
@@ -47,7 +49,7 @@ pub struct PressState {
     /// The latest answer, or why there is none, with its question.
     answered: Option<Answered>,
     solving: Background<Result<Answered, JobError>>,
-    comparison: Comparison,
+    decoders: Decoders,
     demo: Demo,
 }
 
@@ -58,14 +60,13 @@ impl PressState {
     /// Nothing pressed. `wake` is called when something was computed in the background.
     pub fn new(wake: &Wake) -> Self {
         Self {
-            hand: Hand::default(),
             finger: Finger::default(),
             place_mm: None,
             grip_mm: None,
             target: None,
             answered: None,
             solving: Background::prompt("press", Arc::clone(wake)),
-            comparison: Comparison::new(wake),
+            decoders: Decoders::new(Arc::clone(wake), &[DecoderKind::Mean]),
             demo: Demo::new(wake),
         }
     }
@@ -87,9 +88,9 @@ impl PressState {
     }
 
     /// Presses the middle of the nodes.
-    pub fn press_middle(&mut self, test: &TestView) {
-        let (geometry, scale) = (&test.sensor.geometry, test.sensor.scale);
-        let [first, last] = [test.rows.first(), test.rows.last()].map(|row| row.copied().unwrap_or(0));
+    pub fn press_middle(&mut self, skin: &Skin) {
+        let (geometry, scale) = (&skin.sensor.geometry, skin.sensor.scale);
+        let [first, last] = [skin.rows.first(), skin.rows.last()].map(|row| row.copied().unwrap_or(0));
         let first = geometry.row_node_mm(scale, first, 0);
         let last = geometry.row_node_mm(scale, last, scale.nodes_per_row() - 1);
         self.place_mm = Some(0.5 * (first + last).truncate());
@@ -107,7 +108,7 @@ impl PressState {
 
     /// Has the touch answered, one question at a time; `result` is that of the displayed network.
     pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
-        let Some(test) = shared.test() else {
+        let Some(skin) = shared.skin() else {
             // A recording has no sensor model to press.
             self.let_go();
             self.target = None;
@@ -116,7 +117,7 @@ impl PressState {
         if self
             .answered
             .as_ref()
-            .is_some_and(|(question, _)| !question.is_of(test))
+            .is_some_and(|(question, _)| !question.is_of(skin))
         {
             // Another array, or another scene.
             self.let_go();
@@ -124,17 +125,19 @@ impl PressState {
         let Some(place_mm) = self.place_mm else { return };
         let own = shared.shown_run().zip(result).map(|(run, result)| Subject {
             networks: Arc::clone(&result.networks),
-            settings: *run.settings(),
-            is_demo: false,
-            is_idle: result.is_idle,
+            setup: run.setup.clone(),
+            problem: Arc::clone(&run.problem),
         });
         if own.is_none() {
-            self.demo.follow(test);
+            let scene = shared.draft.simulation().map(|simulation| simulation.scene);
+            self.demo.follow(skin, scene.unwrap_or_default().noise);
         }
         let question = Question {
             finger: self.finger,
             place_mm,
-            test: test.clone(),
+            skin: Arc::clone(skin),
+            is_demo: own.is_none(),
+            is_idle: own.is_none() || result.is_some_and(|result| result.is_idle),
             subject: own.or_else(|| self.demo.subject.clone()?.ok()),
         };
         while let Some(answered) = self.solving.next_event() {
@@ -148,8 +151,21 @@ impl PressState {
         if !is_answered && !self.solving.is_under_way() {
             self.solving.start(move |_| solve(question), |answered| answered);
         }
-        if let Some((question, Ok(shown))) = &self.answered {
-            self.comparison.follow(question, &shown.pressed);
+        if let Some((
+            Question {
+                subject: Some(subject),
+                is_idle,
+                ..
+            },
+            Ok(shown),
+        )) = &self.answered
+        {
+            match is_idle {
+                true => self
+                    .decoders
+                    .follow(&subject.networks, &shown.pressed, || subject.clone()),
+                false => self.decoders.forget(),
+            }
         }
     }
 
@@ -171,16 +187,6 @@ struct Target {
     rect: Rect,
     sight: Sight,
     surface: Surface,
-}
-
-/// Work of the pointer on the actual surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Hand {
-    /// It presses.
-    #[default]
-    Press,
-    /// It turns the surface.
-    Turn,
 }
 
 /// The ball that presses.

@@ -2,8 +2,8 @@ use decoupler_files::figure::surface::Ray;
 use eframe::egui::{Context, Key, Modifiers, Painter, PointerButton, Pos2, Response, Shape, Stroke, pos2};
 use glam::{DVec2, DVec3};
 
-use super::{Hand, PressState, Target};
-use crate::window::{test_view::TestView, theme::Palette};
+use super::{PressState, Target};
+use crate::window::{test_view::Skin, theme::Palette};
 
 /// Share of the stroke per point of scrolling: the whole stroke takes about ten notches of a typical wheel.
 const SHARE_PER_POINT: f64 = 0.002;
@@ -16,18 +16,17 @@ const DASH: [f32; 2] = [4.0, 3.0];
 
 impl PressState {
     /// Handles mouse and keys before anything of this frame is drawn. `lit` is the node lit by the pointer.
-    pub fn take_pointer(&mut self, ctx: &Context, test: Option<&TestView>, lit: Option<DVec3>) {
+    pub fn take_pointer(&mut self, ctx: &Context, skin: Option<&Skin>, lit: Option<DVec3>) {
         let target = self.target.clone();
         let has_focus = |target: &Target| ctx.memory(|memory| memory.has_focus(target.id));
         let is_typing = ctx.memory(|memory| memory.focused().is_some()) && !target.as_ref().is_some_and(has_focus);
         if self.is_pressing() && !is_typing && ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape)) {
             self.let_go();
         }
-        let (Some(target), Some(test)) = (target, test) else {
+        let (Some(target), Some(skin)) = (target, skin) else {
             return;
         };
-        let response = ctx.read_response(target.id).filter(|_| self.hand == Hand::Press);
-        let Some(response) = response else {
+        let Some(response) = ctx.read_response(target.id) else {
             self.grip_mm = None;
             return;
         };
@@ -47,10 +46,10 @@ impl PressState {
         if let Some(met) = met {
             self.place_mm = Some(within(&target, met));
         }
-        self.take_wheel_and_keys(ctx, &response, &target, test);
+        self.take_wheel_and_keys(ctx, &response, &target, skin);
     }
 
-    fn take_wheel_and_keys(&mut self, ctx: &Context, response: &Response, target: &Target, test: &TestView) {
+    fn take_wheel_and_keys(&mut self, ctx: &Context, response: &Response, target: &Target, skin: &Skin) {
         if response.contains_pointer() {
             // Consumed, so that nothing else scrolls or zooms; with Ctrl it zooms as usual.
             let points = ctx.input_mut(|input| std::mem::take(&mut input.smooth_scroll_delta).y);
@@ -65,17 +64,17 @@ impl PressState {
             );
             self.finger.deepen(SHARE_PER_KEY * deeper);
             if step != DVec2::ZERO {
-                self.step(target, test, step);
+                self.step(target, skin, step);
             }
         }
     }
 
     /// Moves the ball by half a pitch of the nodes; the first step puts it onto the middle.
-    fn step(&mut self, target: &Target, test: &TestView, step: DVec2) {
+    fn step(&mut self, target: &Target, skin: &Skin, step: DVec2) {
         let Some(place_mm) = self.place_mm else {
-            return self.press_middle(test);
+            return self.press_middle(skin);
         };
-        let geometry = &test.sensor.geometry;
+        let geometry = &skin.sensor.geometry;
         let pitch_mm = DVec2::new(geometry.row_pitch_mm, geometry.node_pitch_mm).abs();
         let moved = place_mm + 0.5 * step * pitch_mm;
         self.place_mm = Some(within(target, moved.extend(0.0)));
@@ -84,7 +83,7 @@ impl PressState {
     /// Draws where the ball touches the surface, and the line from there to the top of the axes: at the touch, otherwise
     /// under the pointer.
     pub fn outline_ui(&self, painter: &Painter, palette: &Palette, pointer: Option<Pos2>, stroke_mm: f64) {
-        let Some(target) = self.target.as_ref().filter(|_| self.hand == Hand::Press) else {
+        let Some(target) = &self.target else {
             return;
         };
         let hovered = || {

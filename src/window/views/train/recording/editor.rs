@@ -15,7 +15,10 @@ use super::{
 };
 use crate::window::{
     job::Wake,
-    shared::{Effect, FileInUse, FileTask, FileWords, Matter, Notice, Purpose, RecordingDraft, Shared, SourceKind},
+    shared::{
+        Effect, FileInUse, FileTask, FileWords, Matter, Notice, Purpose, RecordingDraft, RunsRequest, Shared,
+        SourceKind,
+    },
     training_worker::RunId,
 };
 use decoupler_core::{
@@ -318,7 +321,7 @@ impl RecordingEditor {
                 let name = file.source_name();
                 let text = format!("The settings of {name} are set. Its run is listed in Compare.");
                 effects.push(Effect::Notify(Matter::Recording, Notice::Done(text)));
-                effects.extend((!is_listed).then(|| Effect::KeepRun(file)));
+                effects.extend((!is_listed).then(|| Effect::ChangeRuns(RunsRequest::Keep(file))));
             }
             Opened::Checkpoint(path) => effects.push(Effect::OpenTraining(path)),
         }

@@ -17,3 +17,14 @@ mod samples_card;
 pub use editor::RecordingEditor;
 pub use files_section::recipe_task;
 pub(super) use options::bias;
+
+impl RecordingEditor {
+    /// Returns what is wrong with the recording, and what mends it: a sentence, the text of a button, and its effect; the most
+    /// urgent first.
+    pub fn cures(
+        &self,
+        _shared: &crate::window::shared::Shared,
+    ) -> Vec<(String, String, crate::window::shared::Effect)> {
+        Vec::new()
+    }
+}
