@@ -2,19 +2,12 @@
 
 use std::fs;
 
-use serde_json::Value;
-
 use crate::{
-    memory::{creeping, succeed},
-    printed::json,
+    calls::{has, json, number, read, success, write},
+    memory::creeping,
 };
 
 const TRAIN: &str = "train --time t --inputs u --targets force --hidden auto --budget 1 --data";
-
-/// Returns a number of a candidate.
-fn number(tried: &Value, name: &str) -> f64 {
-    tried[name].as_f64().unwrap()
-}
 
 #[test]
 fn the_answer_has_the_lowest_error_and_the_network_is_marked() {
@@ -40,23 +33,17 @@ fn the_answer_has_the_lowest_error_and_the_network_is_marked() {
         "{search}"
     );
 
-    let text = succeed(&format!("{TRAIN} press.csv"), folder.path());
-    assert!(
-        text.contains("Answer chosen from") && text.contains("within a budget of 1 s"),
-        "{text}"
-    );
-    let marked = text
-        .lines()
-        .filter(|line| line.contains("hidden nodes, ") && line.contains("*  "))
-        .count();
-    assert_eq!(marked, 1, "{text}");
+    let text = success(&format!("{TRAIN} press.csv"), folder.path());
+    has(&text, &["Answer chosen from", "within a budget of 1 s"]);
+    let is_marked = |line: &&str| line.contains("hidden nodes, ") && line.contains("*  ");
+    assert_eq!(text.lines().filter(is_marked).count(), 1, "{text}");
 }
 
 #[test]
 fn test_samples_take_no_part_in_the_choice() {
     let folder = creeping();
     // The last fifth of the 600 rows is for testing.
-    let text = fs::read_to_string(folder.path().join("press.csv")).unwrap();
+    let text = read(folder.path(), "press.csv");
     let replaced = text
         .lines()
         .enumerate()
@@ -64,7 +51,7 @@ fn test_samples_take_no_part_in_the_choice() {
             Some(time) if number > 480 => format!("{time},{},{}\n", number % 7, number % 5),
             _ => format!("{line}\n"),
         });
-    fs::write(folder.path().join("other.csv"), replaced.collect::<String>()).unwrap();
+    write(folder.path(), "other.csv", replaced.collect::<String>());
     let [one, other] = ["press.csv", "other.csv"].map(|file| json(&format!("{TRAIN} {file} --json"), folder.path()));
     assert_eq!(one["search"], other["search"]);
     assert_ne!(one["targets"], other["targets"]);
@@ -90,7 +77,7 @@ fn the_sample_recording_raises_no_warning() {
 #[test]
 fn a_column_that_looks_like_a_group_is_proposed_once() {
     let folder = creeping();
-    let text = fs::read_to_string(folder.path().join("press.csv")).unwrap();
+    let text = read(folder.path(), "press.csv");
     let rows = text.lines().enumerate().map(|(row, line)| match row {
         0 => format!("trial,{line}\n"),
         row => format!("{},{line}\n", row / 60),

@@ -4,28 +4,30 @@ use std::{
     fs,
     io::Write,
     path::Path,
-    process::{Command, Output, Stdio},
+    process::{Command, Output},
 };
 
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::calls::{has, piped};
 
 const ARRAY: &str =
     "--array 2x2_2x6 --samples 40 --set validation-samples=0 --set test-samples=10 --hidden 2 --epochs 1";
 const RECORDING: &str = "--data data.csv --inputs t,u --targets d";
 const FRAMES: &str = "--data presses.csv --inputs r_1..r_6 --targets x_1..z_2 --row-wire row --group snapshot";
 
-/// `@array`, `@recording` and `@frames` stand for their arguments.
-fn run(arguments: &str, folder: &Path, input: &[u8]) -> Output {
+/// The arguments for which `@array`, `@recording` and `@frames` stand.
+pub(crate) fn in_full(arguments: &str) -> String {
     let arguments = arguments.replace("@array", ARRAY).replace("@recording", RECORDING);
-    let arguments = arguments.replace("@frames", FRAMES);
+    arguments.replace("@frames", FRAMES)
+}
+
+/// Runs the program, which replaces files only if it is told so.
+fn run(arguments: &str, folder: &Path, input: &[u8]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
-    command.args(arguments.split_whitespace()).current_dir(folder);
-    let piped = command
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let mut child = piped.spawn().unwrap();
+    command.args(in_full(arguments).split_whitespace()).current_dir(folder);
+    let mut child = piped(&mut command);
     // A command that fails early does not read.
     let _ = child.stdin.take().unwrap().write_all(input);
     child.wait_with_output().unwrap()
@@ -36,7 +38,7 @@ fn text(bytes: &[u8]) -> String {
 }
 
 /// A folder with what the commands read.
-fn prepared() -> TempDir {
+pub(crate) fn prepared() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let rows: String = (0..60).map(|k| format!("{k},{},{}\n", k * k % 7, 2 * k)).collect();
     fs::write(folder.path().join("data.csv"), format!("t,u,d\n{rows}")).unwrap();
@@ -171,36 +173,6 @@ fn a_place_that_cannot_be_written_is_one_line_and_status_1() {
     }
 }
 
-#[test]
-fn a_missing_file_is_one_line_and_status_1() {
-    let folder = prepared();
-    for arguments in [
-        "train --data none.csv --inputs a --targets b",
-        "train --recipe none.json",
-        "train --sensor none.json",
-        "train --checkpoint none.json --resume",
-        "inspect --data none.csv",
-        "decode --network none.json --data readings.csv --out x.csv",
-        "decode --network n.json --data none.csv --out x.csv",
-        "decode --network recording.json --data none.csv --out x.csv",
-        "decode --network n.json --follow --data none.csv",
-        "export --network none.json --format numpy --out x",
-        "calibrate --data none.csv --inputs a --targets b --row-wire c",
-        "calibrate --sensor none.json @frames",
-        "fine-tune --network none.json @frames --out x.json",
-        "trade --data none.csv --inputs a --targets b",
-        "sweep --spec none.json --out x",
-        "sweep --merge none --out x.csv",
-    ] {
-        let output = run(arguments, folder.path(), b"");
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{arguments}: {message}");
-        let errors = message.lines().filter(|line| line.starts_with("error: ")).count();
-        assert!(errors == 1 && output.stdout.is_empty(), "{arguments}: {message}");
-        assert!(!folder.path().join("x.csv").exists(), "{arguments}");
-    }
-}
-
 #[cfg(unix)]
 #[test]
 fn a_dash_is_standard_input_or_output() {
@@ -238,25 +210,26 @@ fn a_dash_is_standard_input_or_output() {
 
 /// The most that a user can take in.
 #[test]
-fn help_is_short_and_train_has_at_most_42_options() {
+fn help_is_short_and_names_settings_formats_and_units() {
     let folder = tempfile::tempdir().unwrap();
-    let options = |help: &str| {
-        let help = text(&run(help, folder.path(), b"").stdout);
-        // Options are indented by six columns, or by two with a short form; explanations by more.
-        let lines = help
-            .lines()
-            .filter(|line| line.starts_with("      --") || line.starts_with("  -"));
-        lines.count()
-    };
+    let help = |arguments: &str| text(&run(arguments, folder.path(), b"").stdout);
+    // Options are indented by six columns, or by two with a short form; explanations by more.
+    let is_option = |line: &&str| line.starts_with("      --") || line.starts_with("  -");
+    let options = |arguments: &str| help(arguments).lines().filter(is_option).count();
     assert!((8..=13).contains(&options("train -h")), "{}", options("train -h"));
     assert!(
         (30..=42).contains(&options("train --help")),
         "{}",
         options("train --help")
     );
-    let help = text(&run("train --help", folder.path(), b"").stdout);
-    let last = help.lines().rfind(|line| line.ends_with(':') && !line.starts_with(' '));
+    let train = help("train --help");
+    let last = train
+        .lines()
+        .rfind(|line| line.ends_with(':') && !line.starts_with(' '));
     assert_eq!(last, Some("Rarely needed:"));
-    let script = run("completions bash", folder.path(), b"");
-    assert!(text(&script.stdout).contains("decoupler") && script.stderr.is_empty());
+    has(&train, &["mu-decrease", "largest-mu", "learning-rate", "momentum"]);
+    let export = ["ohm", "mm", "opset 13", "fixed16", "1e-12", "README.txt", "nanometres"];
+    has(&help("export --help"), &export);
+    has(&help("--version"), &["decoupler "]);
+    has(&help("completions bash"), &["decoupler"]);
 }

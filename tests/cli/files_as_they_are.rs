@@ -1,11 +1,11 @@
 //! Recordings as people have them: several files, patterns and folders, derived columns, wide ranges, many channels.
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{fmt::Write as _, fs};
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tempfile::TempDir;
 
-use crate::{printed::json, terminal::decoupler};
+use crate::calls::{column, failure, has, json, number, read, refused, said, success, warnings, write};
 
 /// Three files of a session each: two readings that differ by the force and a common drift; the third file goes further.
 fn sessions() -> TempDir {
@@ -32,16 +32,6 @@ fn sessions() -> TempDir {
 
 const TRAIN: &str = "--inputs u1,u2 --targets force --hidden 3 --epochs 15 --starts 1 --seed 1 --json";
 
-fn warnings(report: &serde_json::Value) -> String {
-    report["warnings"].to_string()
-}
-
-fn failure(arguments: &str, folder: &Path) -> String {
-    let output = decoupler(arguments, folder);
-    assert!(!output.status.success(), "{arguments}");
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
 #[test]
 fn a_pattern_or_a_folder_is_one_experiment_split_by_file() {
     let folder = sessions();
@@ -66,8 +56,12 @@ fn a_pattern_or_a_folder_is_one_experiment_split_by_file() {
     }
     let of_folder = json(&format!("train --data all {TRAIN}"), folder.path());
     assert_eq!(of_folder["targets"], report["targets"]);
-    let message = failure(&format!("train --data nothing_*.csv {TRAIN}"), folder.path());
-    assert!(message.contains("matches no file"), "{message}");
+    refused(
+        &format!("train --data nothing_*.csv {TRAIN}"),
+        folder.path(),
+        2,
+        "matches no file",
+    );
 }
 
 #[test]
@@ -77,17 +71,10 @@ fn a_damaged_file_of_several_is_left_out_on_request() {
     let whole = fs::read_to_string(&broken).unwrap();
     fs::write(&broken, whole + "\"1,2,3,4\n").unwrap();
     let roles = "--data press_?.csv --inputs u1,u2 --targets force";
-    let message = failure(&format!("inspect {roles} --recipe-out recipe.json"), folder.path());
-    assert!(
-        message.contains("press_2.csv") && message.contains("never closed"),
-        "{message}"
-    );
-    let report = json(
-        &format!("inspect {roles} --skip-damaged --recipe-out recipe.json --json"),
-        folder.path(),
-    );
-    let said = warnings(&report);
-    assert!(said.contains("left out") && said.contains("press_2.csv"), "{said}");
+    let message = failure(&format!("inspect {roles} --recipe-out recipe.json"), folder.path(), 1);
+    has(&message, &["press_2.csv", "never closed"]);
+    let inspect = format!("inspect {roles} --skip-damaged --recipe-out recipe.json --json");
+    has(&warnings(&inspect, folder.path()), &["left out", "press_2.csv"]);
     let train = "train --recipe recipe.json --hidden 3 --epochs 15 --starts 1 --seed 1 --json";
     let with_damage = json(train, folder.path());
     // The same training without the file.
@@ -97,11 +84,7 @@ fn a_damaged_file_of_several_is_left_out_on_request() {
     // Nothing is left of a single file.
     fs::write(&broken, "\"1,2\n").unwrap();
     let alone = "inspect --data press_2.csv --inputs u1,u2 --targets force --skip-damaged --recipe-out one.json";
-    let message = failure(alone, folder.path());
-    assert!(
-        message.contains("press_2.csv") && message.contains("never closed"),
-        "{message}"
-    );
+    refused(alone, folder.path(), 1, "never closed");
 }
 
 #[test]
@@ -113,19 +96,16 @@ fn files_of_different_length_are_joined_row_by_row_on_request() {
             text
         })
     };
-    fs::write(folder.path().join("readings.csv"), rows(0, 103, "a,b\n")).unwrap();
-    fs::write(folder.path().join("forces.csv"), rows(0, 100, "x,y\n")).unwrap();
+    write(folder.path(), "readings.csv", rows(0, 103, "a,b\n"));
+    write(folder.path(), "forces.csv", rows(0, 100, "x,y\n"));
     let roles = "--data readings.csv --join forces.csv --inputs a,b --targets forces.x";
-    let message = failure(&format!("inspect {roles} --recipe-out recipe.json"), folder.path());
-    assert!(message.contains("--truncate"), "{message}");
-    let report = json(
-        &format!("inspect {roles} --truncate --recipe-out recipe.json --json"),
-        folder.path(),
-    );
-    assert!(warnings(&report).contains("the last 3 rows are left out"), "{report}");
+    let inspect = format!("inspect {roles} --recipe-out recipe.json");
+    refused(&inspect, folder.path(), 1, "--truncate");
+    let said = warnings(&format!("{inspect} --truncate --json"), folder.path());
+    has(&said, &["the last 3 rows are left out"]);
     let train = "train --recipe recipe.json --hidden 3 --epochs 15 --starts 1 --seed 1 --json";
     let truncated = json(train, folder.path());
-    fs::write(folder.path().join("readings.csv"), rows(0, 100, "a,b\n")).unwrap();
+    write(folder.path(), "readings.csv", rows(0, 100, "a,b\n"));
     let equal = json(train, folder.path());
     assert_eq!(truncated["targets"], equal["targets"]);
 }
@@ -136,15 +116,12 @@ fn a_table_whose_rows_are_channels_is_noticed() {
     let row =
         |channel: usize| Vec::from_iter((0..400).map(|sample| ((sample * (channel + 2)) % 13).to_string())).join(",");
     let text = Vec::from_iter((0..4).map(row)).join("\n");
-    fs::write(folder.path().join("channels.csv"), text).unwrap();
-    let output = decoupler("inspect --data channels.csv", folder.path());
-    let printed = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-    assert!(printed.contains("transpose it"), "{printed}");
+    write(folder.path(), "channels.csv", text);
+    has(&said("inspect --data channels.csv", folder.path()), &["transpose it"]);
     // Few samples of many channels are not suspect.
-    let wide = |rows: usize| Vec::from_iter((0..rows).map(row)).join("\n");
-    fs::write(folder.path().join("wide.csv"), wide(24)).unwrap();
-    let output = decoupler("inspect --data wide.csv", folder.path());
-    assert!(!String::from_utf8_lossy(&output.stdout).contains("transpose it"));
+    let wide = Vec::from_iter((0..24).map(row)).join("\n");
+    write(folder.path(), "wide.csv", wide);
+    assert!(!said("inspect --data wide.csv", folder.path()).contains("transpose it"));
 }
 
 #[test]
@@ -154,13 +131,13 @@ fn test_samples_outside_the_training_range_are_reported() {
     let report = json(&format!("{data} {TRAIN}"), folder.path());
     let share = report["test_outside_training"].as_f64().unwrap();
     assert!((0.6..0.9).contains(&share), "{share}");
-    assert!(warnings(&report).contains("(force in "), "{report}");
+    assert!(report["warnings"].to_string().contains("(force in "), "{report}");
     let inside = json(
         &format!("train --data press_1.csv --test-data press_2.csv {TRAIN}"),
         folder.path(),
     );
     assert!(inside["test_outside_training"].as_f64().unwrap() < 0.1, "{inside}");
-    assert!(!warnings(&inside).contains("(force in "), "{inside}");
+    assert!(!inside["warnings"].to_string().contains("(force in "), "{inside}");
 }
 
 #[test]
@@ -173,31 +150,12 @@ fn derived_columns_are_inputs_that_decode_computes_again() {
         folder.path(),
     );
     // The difference of the readings is twice the force.
-    assert!(report["targets"][0]["rmse"].as_f64().unwrap() < 0.01, "{report}");
-    let decoded = decoupler(
+    assert!(number(&report["targets"][0], "rmse") < 0.01, "{report}");
+    success(
         "decode --network network.json --data press_1.csv --out decoded.csv",
         folder.path(),
     );
-    assert!(decoded.status.success(), "{decoded:?}");
-    let decoded = fs::read_to_string(folder.path().join("decoded.csv")).unwrap();
-    let first: f64 = decoded
-        .lines()
-        .nth(1)
-        .unwrap()
-        .split(',')
-        .next()
-        .unwrap()
-        .parse()
-        .unwrap();
-    let text = fs::read_to_string(folder.path().join("press_1.csv")).unwrap();
-    let force: f64 = text
-        .lines()
-        .nth(1)
-        .unwrap()
-        .rsplit(',')
-        .next()
-        .unwrap()
-        .parse()
-        .unwrap();
-    assert!((first - force).abs() < 0.05, "{first} for {force}");
+    let decoded = column(&read(folder.path(), "decoded.csv"), "force");
+    let force = column(&read(folder.path(), "press_1.csv"), "force");
+    assert!((decoded[0] - force[0]).abs() < 0.05, "{} for {}", decoded[0], force[0]);
 }

@@ -4,7 +4,7 @@
 
 mod automatic;
 mod calibrate;
-mod causes;
+mod calls;
 mod commands;
 mod conventions;
 mod earlier_files;
@@ -20,11 +20,13 @@ mod live;
 mod memory;
 mod own_export;
 mod own_trade;
-mod printed;
 mod recorded;
+mod refusals;
 mod reproduce;
+#[cfg(unix)]
 mod resume;
 mod scenes;
+#[cfg(unix)]
 mod sweep;
 
 #[path = "../support/folders.rs"]

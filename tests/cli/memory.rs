@@ -1,10 +1,14 @@
 //! A memory from the arguments to the answers: training, decoding of files and of streams.
 
-use std::{collections::HashMap, fmt::Write, fs, path::Path};
+use std::{collections::HashMap, fmt::Write, path::Path};
 
 use tempfile::TempDir;
 
-use crate::{live, printed::json, terminal::decoupler};
+use crate::{
+    calls::{both, column, has, json, number, read, refused, said, success, write},
+    live,
+    terminal::decoupler,
+};
 
 const TRAIN: &str = "train --data press.csv --time t --inputs u --targets force --hidden 3 --starts 1 --epochs 60 \
                      --validation-fraction 0";
@@ -16,224 +20,172 @@ pub(crate) fn creeping() -> TempDir {
     let (mut text, mut readings) = ("t,u,force\n".to_owned(), "t,u\n".to_owned());
     let (mut crept, weight) = (0.0, 1.0 - f64::exp(-0.05));
     for row in 0..600 {
-        let time_s = 0.05 * f64::from(row);
-        let force = 2.0 + f64::sin(1.3 * time_s) + f64::sin(0.37 * time_s * time_s.sqrt());
+        let (time_s, force) = (0.05 * f64::from(row), force(row));
         crept += weight * (force - crept);
         let reading = 0.5 * (force + crept);
         text += &format!("{time_s},{reading},{force}\n");
         readings += &format!("{time_s},{reading}\n");
     }
-    fs::write(folder.path().join("press.csv"), text).unwrap();
-    fs::write(folder.path().join("readings.csv"), readings).unwrap();
+    write(folder.path(), "press.csv", text);
+    write(folder.path(), "readings.csv", readings);
     folder
 }
 
-pub(crate) fn succeed(arguments: &str, folder: &Path) -> String {
-    let output = decoupler(arguments, folder);
-    assert!(
-        output.status.success(),
-        "{arguments}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-    String::from_utf8(output.stdout).unwrap()
+fn force(row: u32) -> f64 {
+    let time_s = 0.05 * f64::from(row);
+    2.0 + f64::sin(1.3 * time_s) + f64::sin(0.37 * time_s * time_s.sqrt())
 }
 
-fn refused(arguments: &str, folder: &Path) -> String {
-    let output = decoupler(arguments, folder);
-    assert!(!output.status.success(), "{arguments}");
-    String::from_utf8(output.stderr).unwrap()
+const FOLLOW: &str = "decode --network n.json --follow --data";
+
+/// The decoded forces of a file.
+fn decoded(input: &str, folder: &Path) -> Vec<f64> {
+    column(
+        &success(&format!("decode --network n.json --data {input} --out -"), folder),
+        "force",
+    )
 }
 
-/// Decoded target of a table, whose first column may be the time.
-fn answers(text: &str) -> Vec<f64> {
-    let column = text.split([',', '\n']).position(|name| name.starts_with("force"));
-    let answer = |line: &str| line.split(',').nth(column.unwrap()).unwrap().parse().unwrap();
-    text.lines().skip(1).map(answer).collect()
+fn followed(input: &str, folder: &Path) -> Vec<f64> {
+    column(&success(&format!("{FOLLOW} {input}"), folder), "force")
+}
+
+#[track_caller]
+fn assert_near(found: &[f64], expected: &[f64], tolerance: f64) {
+    assert_eq!(found.len(), expected.len());
+    for (place, (found, expected)) in found.iter().zip(expected).enumerate() {
+        assert!(
+            (found - expected).abs() < tolerance,
+            "sample {place}: {found} and {expected}"
+        );
+    }
 }
 
 #[test]
 fn a_memory_removes_creep_and_goes_with_the_network() {
     let folder = creeping();
-    let rmse = |report: &serde_json::Value| report["targets"][0]["rmse"].as_f64().unwrap();
-    let without = json(&format!("{TRAIN} --json"), folder.path());
-    let with = json(&format!("{TRAIN} --history 0.5s,2s --out n.json --json"), folder.path());
-    assert!(rmse(&with) < 0.2 * rmse(&without), "{} {}", rmse(&with), rmse(&without));
-    let text = succeed(&format!("{TRAIN} --history 0.5s,2s"), folder.path());
-    assert!(
-        text.lines()
-            .any(|line| line.starts_with("History") && line.ends_with("0.5s,2s")),
-        "{text}"
-    );
-    succeed(
-        "decode --network n.json --data readings.csv --out decoded.csv",
-        folder.path(),
-    );
-    let decoded = answers(&fs::read_to_string(folder.path().join("decoded.csv")).unwrap());
-    let squares = decoded.iter().enumerate().skip(480).map(|(row, found)| {
-        let time_s = 0.05 * row as f64;
-        (found - (2.0 + f64::sin(1.3 * time_s) + f64::sin(0.37 * time_s * time_s.sqrt()))).powi(2)
-    });
+    let folder = folder.path();
+    let rmse = |arguments: &str| {
+        number(
+            &json(&format!("{TRAIN} {arguments} --json"), folder)["targets"][0],
+            "rmse",
+        )
+    };
+    let (without, with) = (rmse(""), rmse("--history 0.5s,2s --out n.json"));
+    assert!(with < 0.2 * without, "{with} {without}");
+    let text = success(&format!("{TRAIN} --history 0.5s,2s"), folder);
+    let is_named = |line: &str| line.starts_with("History") && line.ends_with("0.5s,2s");
+    assert!(text.lines().any(is_named), "{text}");
+    let of_file = decoded("readings.csv", folder);
+    let squares = (480..600).map(|row| (of_file[row as usize] - force(row)).powi(2));
     let found = (squares.sum::<f64>() / 120.0).sqrt();
-    assert!(
-        (found / rmse(&with) - 1.0).abs() < 1e-6,
-        "{found}, in training {}",
-        rmse(&with)
-    );
+    assert!((found / with - 1.0).abs() < 1e-6, "{found}, in training {with}");
     // A stream with times, and one without, at the interval of the training.
-    let streamed = succeed("decode --network n.json --follow --data readings.csv", folder.path());
-    let readings = fs::read_to_string(folder.path().join("readings.csv")).unwrap();
+    let readings = read(folder, "readings.csv");
     let untimed = readings
         .lines()
         .map(|line| format!("{}\n", line.split_once(',').unwrap().1));
-    fs::write(folder.path().join("untimed.csv"), untimed.collect::<String>()).unwrap();
-    let without_times = succeed("decode --network n.json --follow --data untimed.csv", folder.path());
-    // The times are copied as they came.
-    let header = streamed.lines().next().unwrap();
-    assert!(header.starts_with("t,"), "{header}");
-    let times = |text: &str| {
-        Vec::from_iter(
-            text.lines()
-                .skip(1)
-                .map(|line| line.split(',').next().unwrap().to_owned()),
-        )
-    };
-    assert_eq!(times(&streamed), times(&readings));
-    let objects = succeed(
-        "decode --network n.json --follow --format jsonl --data readings.csv",
-        folder.path(),
-    );
-    let object: serde_json::Value = serde_json::from_str(objects.lines().nth(1).unwrap()).unwrap();
-    assert_eq!(object["columns"]["t"], times(&readings)[1].as_str());
-    for found in [answers(&streamed), answers(&without_times)] {
-        assert_eq!(found.len(), decoded.len());
-        assert!(
-            found
-                .iter()
-                .zip(&decoded)
-                .all(|(one, other)| (one - other).abs() < 1e-9)
-        );
+    write(folder, "untimed.csv", untimed.collect::<String>());
+    for input in ["readings.csv", "untimed.csv"] {
+        assert_near(&followed(input, folder), &of_file, 1e-9);
     }
+    // The times are copied as they came.
+    let times = |text: &str| Vec::from_iter(text.lines().map(|line| line.split(',').next().unwrap().to_owned()));
+    assert_eq!(
+        times(&success(&format!("{FOLLOW} readings.csv"), folder)),
+        times(&readings)
+    );
+    let objects = success(&format!("{FOLLOW} readings.csv --format jsonl"), folder);
+    let object: serde_json::Value = serde_json::from_str(objects.lines().nth(1).unwrap()).unwrap();
+    assert_eq!(object["columns"]["t"], times(&readings)[2].as_str());
 }
 
 #[test]
 fn a_stream_is_decoded_like_a_file_with_derived_columns_and_a_memory() {
     let folder = creeping();
+    let train = TRAIN.replace("--inputs u", "--inputs d,q");
     let derive = "--derive d=u-start(1s) --derive q=u/start(5)";
-    succeed(
-        &format!(
-            "{} {derive} --history 0.5s --out n.json",
-            TRAIN.replace("--inputs u", "--inputs d,q")
-        ),
-        folder.path(),
-    );
-    let decode = "decode --network n.json --data readings.csv";
-    succeed(&format!("{decode} --out decoded.csv"), folder.path());
-    let decoded = answers(&fs::read_to_string(folder.path().join("decoded.csv")).unwrap());
-    let output = decoupler(&format!("{decode} --follow"), folder.path());
-    let warnings = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        warnings.contains("line 2: the lines at the start give the means"),
-        "{warnings}"
-    );
-    let streamed = answers(&String::from_utf8(output.stdout).unwrap());
-    // The rows of the first second, which are over with that at 1.05 s.
-    assert_eq!((decoded.len(), streamed.len()), (600, 579));
-    for (found, expected) in streamed.iter().zip(&decoded[21..]) {
-        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
-    }
+    success(&format!("{train} {derive} --history 0.5s --out n.json"), folder.path());
+    let of_file = decoded("readings.csv", folder.path());
+    let (text, warnings) = both(&format!("{FOLLOW} readings.csv"), folder.path());
+    has(&warnings, &["line 2: the lines at the start give the means"]);
+    // Without the rows of the first second, which are over with that at 1.05 s.
+    assert_near(&column(&text, "force"), &of_file[21..], 1e-9);
     // A stream without one of the columns is refused with the reason.
-    fs::write(folder.path().join("other.csv"), "t,v\n0,1\n").unwrap();
-    let message = refused("decode --network n.json --follow --data other.csv", folder.path());
-    assert!(message.contains("there is no column 'd'"), "{message}");
+    write(folder.path(), "other.csv", "t,v\n0,1\n");
+    let output = decoupler(&format!("{FOLLOW} other.csv"), folder.path());
+    assert_eq!(output.status.code(), Some(1));
+    has(
+        &String::from_utf8(output.stderr).unwrap(),
+        &["error: 'other.csv': line 1: there is no column 'd'"],
+    );
 }
 
 #[test]
 fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
     let folder = creeping();
-    succeed(
-        &format!("{TRAIN} --lags 5,0.5s --differences --recipe-out r.json --out a.json"),
-        folder.path(),
-    );
-    let recipe = fs::read_to_string(folder.path().join("r.json")).unwrap();
-    assert!(recipe.contains("\"lags\"") && recipe.contains("\"0.5s\""), "{recipe}");
-    let message = refused(
-        "train --data press.csv --inputs u --targets force --history 2s",
-        folder.path(),
-    );
-    assert!(message.contains("a memory of 2s needs times"), "{message}");
-    let message = refused(&format!("{TRAIN} --history 2h"), folder.path());
-    assert!(message.contains("write a number of samples as in 20"), "{message}");
-    let message = refused(
-        "export --network a.json --format c99 --precision fixed16 --out c",
-        folder.path(),
-    );
-    assert!(
-        message.contains("no history of readings: give --precision f64 or f32"),
-        "{message}"
-    );
+    let recipe = "--lags 5,0.5s --differences --recipe-out r.json --out a.json";
+    success(&format!("{TRAIN} {recipe}"), folder.path());
+    has(&read(folder.path(), "r.json"), &["\"lags\"", "\"0.5s\""]);
+    let without_time = TRAIN.replace("--time t ", "");
+    for (arguments, status, cause) in [
+        (format!("{without_time} --history 2s"), 2, "a memory of 2s needs times"),
+        (format!("{TRAIN} --history 2h"), 2, "write a number of samples as in 20"),
+        (
+            format!("{TRAIN} --history 0.01s"),
+            1,
+            "0.01s is shorter than the usual interval",
+        ),
+        (
+            "export --network a.json --format c99 --precision fixed16 --out c".to_owned(),
+            2,
+            "no history of readings: give --precision f64 or f32",
+        ),
+    ] {
+        refused(&arguments, folder.path(), status, cause);
+    }
 }
 
 #[test]
 fn every_format_exports_the_history_with_golden_readings_in_series() {
     let folder = creeping();
-    let memory = "--history 0.5s,40 --lags 3,0.2s --differences --out n.json";
-    succeed(&format!("{TRAIN} {memory}"), folder.path());
-    for (format, precision, file) in [
-        ("c99", "f64", "c99_f64_decode.c"),
-        ("c99", "f32", "c99_f32_decode.c"),
-        ("onnx", "f32", "network.onnx"),
-        ("numpy", "f64", "decode.py"),
-        ("matlab", "f64", "matlab_f64_decode.m"),
+    // A name that is a formula.
+    let text = read(folder.path(), "press.csv").replacen("t,u,", "t,=1+u,", 1);
+    write(folder.path(), "press.csv", text);
+    let train = TRAIN.replace("--inputs u", "--inputs =1+u");
+    // A past of lags alone, or of averages alone, needs only a part of the state in C, which compiles without warnings.
+    let all = "--history 0.5s,40 --lags 3,0.2s --differences";
+    for (memory, format, precision, file) in [
+        ("--lags 5", "c99", "f64", "lags_decode.c"),
+        ("--history 0.5s", "c99", "f64", "averages_decode.c"),
+        (all, "c99", "f64", "all_decode.c"),
+        (all, "c99", "f32", "single_decode.c"),
+        (all, "onnx", "f32", "network.onnx"),
+        (all, "numpy", "f64", "decode.py"),
+        (all, "matlab", "f64", "matlab_decode.m"),
     ] {
-        let out = format!("{format}_{precision}");
+        let out = file.split('_').next().unwrap().replace('.', "_");
+        success(&format!("{train} {memory} --out n.json"), folder.path());
         let export = format!("export --network n.json --format {format} --precision {precision} --out {out} --json");
         let report = json(&export, folder.path());
-        let limit = report["limit"].as_f64().unwrap();
-        assert!(
-            report["deviation"].as_f64().unwrap_or(0.0) <= limit && limit < 1e-2,
-            "{format}: {report}"
-        );
+        let limit = number(&report, "limit");
+        let deviation = report["deviation"].as_f64().unwrap_or(0.0);
+        assert!(deviation <= limit && limit < 1e-2, "{format}: {report}");
         let found = folder.path().join(&out);
         assert!(found.join(file).is_file(), "{format}");
-        let golden = fs::read_to_string(found.join("golden.csv")).unwrap();
-        assert!(golden.starts_with("new_series,time_s,u,force\n"), "{golden}");
+        let golden = read(&found, "golden.csv");
+        assert!(golden.starts_with("new_series,time_s,'=1+u,force\n"), "{golden}");
         assert!(
             golden.lines().filter(|line| line.starts_with("1,")).count() >= 2,
             "{golden}"
         );
-        let readme = fs::read_to_string(found.join("README.txt")).unwrap();
-        let readme = readme.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(
-            readme.contains("restarts by itself where the time steps back, and after a pause"),
-            "{readme}"
+        let readme = read(&found, "README.txt");
+        let readme = Vec::from_iter(readme.split_whitespace()).join(" ");
+        has(
+            &readme,
+            &["restarts by itself where the time steps back, and after a pause"],
         );
     }
-}
-
-/// A past of lags alone, or of averages alone, needs only a part of the state in C, which compiles without warnings.
-#[test]
-fn lags_and_averages_alone_are_exported_and_verified_in_c() {
-    let folder = creeping();
-    for (name, memory) in [("lags", "--lags 5"), ("averages", "--history 0.5s")] {
-        succeed(&format!("{TRAIN} {memory} --out {name}.json"), folder.path());
-        let export = format!("export --network {name}.json --format c99 --out {name} --json");
-        let report = json(&export, folder.path());
-        let limit = report["limit"].as_f64().unwrap();
-        assert!(report["deviation"].as_f64().unwrap_or(0.0) <= limit, "{name}: {report}");
-    }
-}
-
-#[test]
-fn names_in_the_golden_sequence_are_no_formulas() {
-    let folder = creeping();
-    let path = folder.path().join("press.csv");
-    let text = fs::read_to_string(&path).unwrap();
-    fs::write(&path, text.replacen("t,u,", "t,=1+u,", 1)).unwrap();
-    let train = TRAIN.replace("--inputs u", "--inputs =1+u");
-    succeed(&format!("{train} --lags 3 --out n.json"), folder.path());
-    succeed("export --network n.json --format numpy --out numpy", folder.path());
-    let golden = fs::read_to_string(folder.path().join("numpy/golden.csv")).unwrap();
-    assert!(golden.starts_with("new_series,time_s,'=1+u,force"), "{golden}");
 }
 
 /// How the times of a recording are written.
@@ -248,22 +200,16 @@ enum Clock {
 /// starts again in the middle. The target is the reading and, by half, that two samples before in the same group and
 /// row-wire, or the first after a pause or a restart of the clock.
 fn several_series(clock: Clock) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let header = match clock {
-        Clock::Seconds | Clock::Stamps => "time",
-        Clock::Milliseconds => "time (ms)",
-    };
-    let mut text = format!("{header},press (id),row,u,force\n");
+    let unit = if clock == Clock::Milliseconds { " (ms)" } else { "" };
+    let mut text = format!("time{unit},press (id),row,u,force\n");
     let mut pasts: HashMap<(usize, usize), (f64, Vec<f64>)> = HashMap::new();
     let mut time_ms = 0_u32;
     for sample in 0..3000_usize {
-        time_ms += match sample {
-            1000 | 2200 => 60_000,
-            _ => 20 + (sample * sample % 31) as u32,
+        time_ms = match sample {
+            1000 | 2200 => time_ms + 60_000,
+            1500 => 0,
+            _ => time_ms + 20 + (sample * sample % 31) as u32,
         };
-        if sample == 1500 {
-            time_ms = 0;
-        }
         let series = ((sample / 3) % 2, sample % 3);
         let reading = f64::sin(0.37 * sample as f64) + f64::sin(1.9 * (sample as f64).sqrt());
         let time_s = f64::from(time_ms) / 1000.0;
@@ -285,28 +231,11 @@ fn several_series(clock: Clock) -> TempDir {
         let press = ["first", "second"][series.0];
         writeln!(text, "{time},{press},{},{reading},{force}", series.1 + 1).unwrap();
     }
+    let folder = tempfile::tempdir().unwrap();
     for name in ["press.csv", "same.csv"] {
-        fs::write(folder.path().join(name), &text).unwrap();
+        write(folder.path(), name, &text);
     }
     folder
-}
-
-const TRAIN_SERIES: &str = "train --data press.csv --test-data same.csv --time time --group press --row-wire row --inputs u \
-                            --targets force --lags 2 --hidden 3 --starts 1 --epochs 60 --validation-fraction 0";
-
-/// Numbers of the column of a CSV text whose name begins like this.
-fn column(text: &str, name: &str) -> Vec<f64> {
-    let mut lines = text.lines();
-    let column = lines.next().unwrap().split(',').position(|cell| cell.starts_with(name));
-    let number = |line: &str| line.split(',').nth(column.unwrap()).unwrap().parse().unwrap();
-    lines.map(number).collect()
-}
-
-fn r2(found: &[f64], expected: &[f64]) -> f64 {
-    let mean = expected.iter().sum::<f64>() / expected.len() as f64;
-    let squares =
-        |of: &dyn Fn(f64, f64) -> f64| found.iter().zip(expected).map(|(a, b)| of(*a, *b).powi(2)).sum::<f64>();
-    1.0 - squares(&|found, expected| found - expected) / squares(&|_, expected| expected - mean)
 }
 
 /// Every way to decode continues the same states as the training.
@@ -314,113 +243,53 @@ fn r2(found: &[f64], expected: &[f64]) -> f64 {
 fn files_and_streams_are_decoded_with_the_past_of_training() {
     for clock in [Clock::Seconds, Clock::Milliseconds, Clock::Stamps] {
         let folder = several_series(clock);
-        let report = json(&format!("{TRAIN_SERIES} --out n.json --json"), folder.path());
-        let in_training = report["targets"][0]["r2"].as_f64().unwrap();
-        assert!(in_training > 0.9999, "{clock:?}: R² {in_training} in training");
-        let truth = column(&fs::read_to_string(folder.path().join("press.csv")).unwrap(), "force");
-        succeed("decode --network n.json --data press.csv --out d.csv", folder.path());
-        let decoded = column(&fs::read_to_string(folder.path().join("d.csv")).unwrap(), "force");
-        let of_file = r2(&decoded, &truth);
+        let folder = folder.path();
+        let train = "train --data press.csv --test-data same.csv --time time --group press --row-wire row --inputs u \
+                     --targets force --lags 2 --hidden 3 --starts 1 --epochs 60 --validation-fraction 0 --out n.json";
+        let target = &json(&format!("{train} --json"), folder)["targets"][0];
+        assert!(number(target, "r2") > 0.9999, "{clock:?}: {target}");
+        let truth = column(&read(folder, "press.csv"), "force");
+        let of_file = decoded("press.csv", folder);
+        let squares = of_file.iter().zip(&truth).map(|(found, force)| (found - force).powi(2));
+        let rmse = (squares.sum::<f64>() / truth.len() as f64).sqrt();
         assert!(
-            (of_file - in_training).abs() < 1e-9,
-            "{clock:?}: R² {of_file} by decode, {in_training} in training"
+            (rmse / number(target, "rmse") - 1.0).abs() < 1e-6,
+            "{clock:?}: {rmse}, in training {target}"
         );
-        let followed = column(
-            &succeed("decode --network n.json --follow --data press.csv", folder.path()),
-            "force",
-        );
-        assert_eq!(followed.len(), decoded.len());
-        for (line, (found, expected)) in followed.iter().zip(&decoded).enumerate() {
-            assert!(
-                (found - expected).abs() < 1e-12,
-                "{clock:?}, sample {line}: {found} and {expected}"
-            );
-        }
-        for shown in live::answers(&folder.path().join("n.json"), &folder.path().join("press.csv")) {
-            assert_eq!(shown.len(), decoded.len(), "{clock:?}");
-            for (sample, (found, expected)) in shown.iter().zip(&decoded).enumerate() {
-                assert!(
-                    (found[0] - expected).abs() < 1e-12,
-                    "{clock:?}, sample {sample}: {found:?} and {expected}"
-                );
-            }
+        assert_near(&followed("press.csv", folder), &of_file, 1e-12);
+        for shown in live::answers(&folder.join("n.json"), &folder.join("press.csv")) {
+            assert_near(&shown.concat(), &of_file, 1e-12);
         }
     }
 }
 
 #[test]
-fn a_file_with_rows_out_of_order_is_decoded_in_order_of_time() {
+fn rows_out_of_order_are_taken_in_order_of_time_and_rows_without_a_time_left_out() {
     let folder = creeping();
-    succeed(&format!("{TRAIN} --history 0.5s,2s --out n.json"), folder.path());
-    let sorted = fs::read_to_string(folder.path().join("readings.csv")).unwrap();
-    let (header, lines) = sorted.split_once('\n').unwrap();
+    let folder = folder.path();
+    success(&format!("{TRAIN} --history 0.5s,2s --out n.json"), folder);
+    let decode = "decode --network n.json --out d.csv --data";
+    assert!(!said(&format!("{decode} readings.csv"), folder).contains("backwards"));
+    let sorted = decoded("readings.csv", folder);
+    let readings = read(folder, "readings.csv");
+    let (header, lines) = readings.split_once('\n').unwrap();
     let lines = Vec::from_iter(lines.lines());
-    let shuffled = Vec::from_iter((0..lines.len()).map(|row| lines[row * 181 % lines.len()]));
-    fs::write(
-        folder.path().join("shuffled.csv"),
-        format!("{header}\n{}\n", shuffled.join("\n")),
-    )
-    .unwrap();
-    let decode = |input: &str| {
-        decoupler(
-            &format!("decode --network n.json --data {input} --out d.csv"),
-            folder.path(),
-        )
-    };
-    let warnings = decode("shuffled.csv").stderr;
-    let warnings = String::from_utf8_lossy(&warnings);
-    assert!(warnings.contains("the rows are taken in order of time"), "{warnings}");
-    let of_shuffled = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
-    let warnings = decode("readings.csv").stderr;
-    assert!(!String::from_utf8_lossy(&warnings).contains("backwards"));
-    let of_sorted = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
-    for (row, found) in of_shuffled.iter().enumerate() {
-        let expected = of_sorted[row * 181 % lines.len()];
-        assert!((found - expected).abs() < 1e-12, "row {row}: {found} and {expected}");
-    }
-}
-
-#[test]
-fn lines_without_a_time_are_left_out_by_file_and_stream_alike() {
-    let folder = creeping();
-    succeed(&format!("{TRAIN} --history 0.5s,2s --out n.json"), folder.path());
-    let readings = fs::read_to_string(folder.path().join("readings.csv")).unwrap();
+    let place = |row: usize| row * 181 % lines.len();
+    let shuffled = Vec::from_iter((0..lines.len()).map(|row| lines[place(row)]));
+    write(folder, "shuffled.csv", format!("{header}\n{}\n", shuffled.join("\n")));
+    has(
+        &said(&format!("{decode} shuffled.csv"), folder),
+        &["the rows are taken in order of time"],
+    );
+    let expected = Vec::from_iter((0..lines.len()).map(|row| sorted[place(row)]));
+    assert_near(&decoded("shuffled.csv", folder), &expected, 1e-12);
     let damaged = readings.replace("\n5.5,", "\nnan,").replace("\n7.25,", "\n,");
-    fs::write(folder.path().join("damaged.csv"), damaged).unwrap();
-    let output = decoupler("decode --network n.json --data damaged.csv --out d.csv", folder.path());
-    let warnings = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        warnings.contains("2 lines without a time") && warnings.contains("line 112"),
-        "{warnings}"
+    write(folder, "damaged.csv", damaged);
+    has(
+        &said(&format!("{decode} damaged.csv"), folder),
+        &["2 lines without a time", "line 112"],
     );
-    let decoded = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
-    let output = decoupler("decode --network n.json --follow --data damaged.csv", folder.path());
-    let warnings = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        warnings.contains("598 lines decoded") && warnings.contains("2 bad"),
-        "{warnings}"
-    );
-    assert_eq!(answers(&String::from_utf8(output.stdout).unwrap()), decoded);
-}
-
-#[test]
-fn a_memory_shorter_than_an_interval_is_refused() {
-    let folder = creeping();
-    let press = fs::read_to_string(folder.path().join("press.csv")).unwrap();
-    let (header, lines) = press.split_once('\n').unwrap();
-    let lines = lines.lines().map(|line| {
-        let (time_s, rest) = line.split_once(',').unwrap();
-        format!("{},{rest}\n", 1000.0 * time_s.parse::<f64>().unwrap())
-    });
-    fs::write(
-        folder.path().join("press.csv"),
-        format!("{header}\n{}", lines.collect::<String>()),
-    )
-    .unwrap();
-    let message = refused(&format!("{TRAIN} --history 0.5s"), folder.path());
-    assert!(
-        message.contains("0.5s is shorter than the usual interval") && message.contains("50.0 s"),
-        "{message}"
-    );
-    succeed(&format!("{TRAIN} --history 0.5s --unit t=ms"), folder.path());
+    let (text, warnings) = both(&format!("{FOLLOW} damaged.csv"), folder);
+    has(&warnings, &["598 lines decoded", "2 bad"]);
+    assert_eq!(column(&text, "force"), decoded("damaged.csv", folder));
 }

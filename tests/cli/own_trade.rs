@@ -1,13 +1,13 @@
 //! The trade-off of a recording in the terminal: all decoders are measured on the test samples; options of a simulated
 //! sensor are refused.
 
-use std::{fs, path::Path};
+use std::fs;
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::{printed::success, terminal::decoupler};
+use crate::calls::{has, json, number, success};
 
 const DATA: &str = "--data skin.csv --inputs c1..c3 --targets c4,c5";
 
@@ -31,17 +31,13 @@ fn recording() -> TempDir {
     folder
 }
 
-fn json(arguments: &str, folder: &Path) -> Value {
-    serde_json::from_str(&success(&format!("{arguments} --json"), folder)).unwrap()
-}
-
 #[test]
 fn each_decoder_has_its_errors_times_and_place_on_the_fronts() {
     let folder = recording();
     let arguments = format!(
         "trade {DATA} --hidden 2,6 --method br,lm --epochs 40 --split time --under-percent 0.0001 --under-us 1e9"
     );
-    let report = json(&arguments, folder.path());
+    let report = json(&format!("{arguments} --json"), folder.path());
     assert_eq!(
         (&report["decoded"], &report["test_samples"]),
         (&"a sample".into(), &40.into())
@@ -49,7 +45,6 @@ fn each_decoder_has_its_errors_times_and_place_on_the_fronts() {
     let points = report["points"].as_array().unwrap();
     // Four without a network, and twice two networks in 64 and 32 bits.
     assert_eq!(points.len(), 4 + 2 * 2 * 2);
-    let number = |point: &Value, name: &str| point[name].as_f64().unwrap();
     for point in points {
         let targets = point["targets"].as_array().unwrap();
         let mean = targets
@@ -112,8 +107,8 @@ fn the_command_of_a_point_trains_its_network() {
     let arguments = format!(
         "trade {DATA} {given} --hidden 3 --method lm --epochs 30 --seed 7 --decoder network --recipe-out r.json"
     );
-    let of_arguments = json(&arguments, folder.path());
-    let of_recipe = "trade --recipe r.json --hidden 3 --method lm --epochs 30 --seed 7 --decoder network";
+    let of_arguments = json(&format!("{arguments} --json"), folder.path());
+    let of_recipe = "trade --recipe r.json --hidden 3 --method lm --epochs 30 --seed 7 --decoder network --json";
     let of_recipe = json(of_recipe, folder.path());
     for report in [&of_arguments, &of_recipe] {
         let warnings = report["warnings"].to_string();
@@ -121,7 +116,7 @@ fn the_command_of_a_point_trains_its_network() {
         let point = &report["points"][0];
         let command = point["command"].as_str().unwrap().strip_prefix("decoupler ").unwrap();
         // The shell removes the quotes.
-        let trained = json(&command.replace('\'', ""), folder.path());
+        let trained = json(&format!("{} --json", command.replace('\'', "")), folder.path());
         let [of_train, of_point] = [&trained, point].map(|from| from["targets"][1]["rmse"].as_f64().unwrap());
         // The trade-off measures compiled networks, which round differently.
         assert!(
@@ -139,7 +134,7 @@ fn the_table_lists_the_errors_of_each_target_in_its_unit() {
         &format!("trade {DATA} --unit c4=mm --unit c5=N --hidden 2 --epochs 5 --decoder ridge,network --under-us 1e9"),
         folder.path(),
     );
-    for expected in [
+    let expected = [
         "160 samples for training, 0 for validation, 40 for testing (split by time)",
         "Time to decode a sample",
         "% of range",
@@ -147,38 +142,6 @@ fn the_table_lists_the_errors_of_each_target_in_its_unit() {
         "c5 (N)",
         "Network f32, br, 2 hidden",
         "Most accurate under 1000000000 us: ",
-    ] {
-        assert!(text.contains(expected), "{expected}: {text}");
-    }
-}
-
-#[test]
-fn options_of_a_simulated_sensor_are_refused_and_vice_versa() {
-    let folder = recording();
-    let own = |argument: &str| format!("trade {DATA} {argument}");
-    let cases = [
-        (own("--array 2x3_2x9"), "no array"),
-        (own("--samples 10"), "--where"),
-        (own("--set test-samples=10"), "--test-fraction"),
-        (own("--preset best"), "no scene"),
-        (own("--noise 0,1e-3"), "its own noise"),
-        (
-            own("--decoder ridge,newton"),
-            "--decoder newton: it solves the equations of a simulated array",
-        ),
-        (own("--rows known"), "--row-wire"),
-        ("trade --method lm".to_owned(), "the presets name the methods"),
-        ("trade --split time".to_owned(), "--split needs --data"),
-        ("trade --data skin.csv --inputs c1".to_owned(), "--targets"),
     ];
-    for (arguments, expected) in cases {
-        let output = decoupler(&arguments, folder.path());
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(
-            (output.status.code(), message.lines().count()),
-            (Some(2), 1),
-            "{arguments}: {message}"
-        );
-        assert!(message.contains(expected), "{arguments}: {message}");
-    }
+    has(&text, &expected);
 }

@@ -5,10 +5,12 @@ use std::fs;
 use decoupler_core::{dataset::SplitBy, evaluation::Intervals, job::Job};
 use decoupler_files::export::NetworkFile;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::{printed::json, terminal::decoupler};
+use crate::{
+    calls::{both, column, has, json, number, read, said, success, warnings, write},
+    terminal::decoupler,
+};
 
 /// A recording of four readings, where d repeats a and e is constant: they determine x, but not y, which is noise.
 fn recording() -> TempDir {
@@ -19,68 +21,45 @@ fn recording() -> TempDir {
         let [a, b, noise, y]: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
         text += &format!("{a},{b},{},7,{},{y}\n", 3.0 - 2.0 * a, a + 0.3 * b + 0.05 * noise);
     }
-    fs::write(folder.path().join("r.csv"), text).unwrap();
+    write(folder.path(), "r.csv", text);
     folder
 }
 
 const INSPECT: &str = "inspect --data r.csv --inputs a,b,d,e --targets x,y";
 
 #[test]
-fn each_target_is_judged_with_an_interval() {
+fn each_target_is_judged_with_an_interval_and_compared_with_other_models_and_splits() {
     let folder = recording();
     let report = json(&format!("{INSPECT} --json"), folder.path());
-    let target = |index: usize| &report["targets"][index];
-    assert_eq!(
-        (&target(0)["standing"], &target(0)["unit"]),
-        (&"determined".into(), &"mm".into())
-    );
+    let [x, y] = [0, 1].map(|target| &report["targets"][target]);
+    assert_eq!((&x["standing"], &x["unit"]), (&"determined".into(), &"mm".into()));
     // The readings do not explain 0.05²/3 of the variance of x, (1 + 0.3² + 0.05²)/3.
-    let r2 = &target(0)["r2"];
-    let expected = 1.0 - 0.0025 / 1.0925;
-    let value = r2["value"].as_f64().unwrap();
-    assert!((value - expected).abs() < 1e-3, "{r2}");
     assert!(
-        r2["low"].as_f64().unwrap() < value && value < r2["high"].as_f64().unwrap(),
-        "{r2}"
+        (number(&x["r2"], "value") - (1.0 - 0.0025 / 1.0925)).abs() < 1e-3,
+        "{x}"
     );
-    assert_eq!(target(1)["standing"], "not determined");
+    for figure in ["r2", "r2_ridge", "r2_kernel"] {
+        let [low, value, high] = ["low", "value", "high"].map(|name| number(&x[figure], name));
+        assert!(low < value && value < high, "{figure}: {x}");
+    }
+    assert_eq!(x["split"]["by"], "time");
+    has(x["split"]["sentence"].as_str().unwrap(), &["split by time"]);
+    assert_eq!(y["standing"], "not determined");
+    let sentence = y["sentence"].as_str().unwrap();
     assert!(
-        target(1)["sentence"]
-            .as_str()
-            .unwrap()
-            .starts_with("ridge and kernel ridge regression explain almost nothing of y (R² ")
+        sentence.starts_with("ridge and kernel ridge regression explain almost nothing of y (R² "),
+        "{sentence}"
     );
-    let warnings = report["warnings"].to_string();
-    assert!(
-        warnings.contains("d repeats a") && warnings.contains("e is 7 in every sample"),
-        "{warnings}"
+    has(
+        &report["warnings"].to_string(),
+        &["d repeats a", "e is 7 in every sample"],
     );
-    let text = String::from_utf8(decoupler(INSPECT, folder.path()).stdout).unwrap();
-    for expected in [
+    let text = success(INSPECT, folder.path());
+    let sentences = [
         "The readings determine x (R² 0.99",
         "Ridge and kernel ridge regression explain almost nothing of y",
-    ] {
-        assert!(text.contains(expected), "{expected}: {text}");
-    }
-}
-
-#[test]
-fn ridge_is_compared_with_kernel_ridge_and_with_a_random_split() {
-    let folder = recording();
-    let report = json(
-        "inspect --data r.csv --inputs a,b,d,e --targets x --json",
-        folder.path(),
-    );
-    let target = &report["targets"][0];
-    for figure in ["r2_ridge", "r2_kernel"] {
-        let value = &target[figure];
-        assert!(
-            value["low"].as_f64().unwrap() <= value["high"].as_f64().unwrap(),
-            "{figure}: {value}"
-        );
-    }
-    assert_eq!(target["split"]["by"], "time");
-    assert!(target["split"]["sentence"].as_str().unwrap().contains("split by time"));
+    ];
+    has(&text, &sentences);
 }
 
 #[test]
@@ -99,10 +78,15 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
     // 90 % of the noise of x is within 0.9 × 0.05; y is nothing but noise between -1 and 1.
     for (target, half_width) in [(0, 0.045), (1, 0.9)] {
         let interval = &report["targets"][target]["interval"];
-        let figure = |name: &str| interval[name].as_f64().unwrap();
-        assert!((figure("half_width") / half_width - 1.0).abs() < 0.2, "{interval}");
+        assert!(
+            (number(interval, "half_width") / half_width - 1.0).abs() < 0.2,
+            "{interval}"
+        );
         let expected = [0, 1].map(|end| interval["expected"][end].as_f64().unwrap());
-        assert!((expected[0]..=expected[1]).contains(&figure("share")), "{interval}");
+        assert!(
+            (expected[0]..=expected[1]).contains(&number(interval, "share")),
+            "{interval}"
+        );
     }
     let without = json(&format!("{train} without.json --intervals never"), folder.path());
     assert_eq!(without["targets"][0].get("interval"), None);
@@ -130,20 +114,17 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
         format!("{row},{},{rest}\n", a.parse::<f64>().unwrap() + 1.7)
     });
     let shifted = format!("t (s),a,b,d,e,x (mm),y\n{}", shifted.collect::<String>());
-    fs::write(folder.path().join("shifted.csv"), shifted).unwrap();
+    write(folder.path(), "shifted.csv", shifted);
     const DRIFTED: &str = "no longer look like the training readings";
     let (_, message) = decode("shifted.csv");
-    assert!(
-        message.contains(DRIFTED) && message.contains("lines 2 to "),
-        "{message}"
-    );
+    has(&message, &[DRIFTED, "lines 2 to "]);
     // Frozen from line 101 to line 200.
     let frozen = Vec::from_iter(fs::read_to_string(&path).unwrap().lines().map(str::to_owned));
     let lines = frozen.iter().zip(1..).map(|(line, number)| match number {
         101..=200 => format!("{number},{}", frozen[99].split_once(',').unwrap().1),
         _ => line.clone(),
     });
-    fs::write(folder.path().join("frozen.csv"), lines.collect::<Vec<_>>().join("\n")).unwrap();
+    write(folder.path(), "frozen.csv", lines.collect::<Vec<_>>().join("\n"));
     let (_, message) = decode("frozen.csv");
     let warning = message.lines().find(|line| line.contains(DRIFTED)).unwrap();
     let lines = warning
@@ -161,12 +142,10 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
     );
     // A stream has the same answers and half-widths as the file, and the same warning.
     let follow = |input: &str| {
-        let output = decoupler(
+        both(
             &format!("decode --network n.json --follow --data {input}"),
             folder.path(),
-        );
-        let [answers, message] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
-        (answers, message)
+        )
     };
     let (followed, message) = follow("r.csv");
     assert!(!message.contains(DRIFTED), "{message}");
@@ -182,16 +161,12 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
     let (_, message) = follow("shifted.csv");
     assert!(message.contains(DRIFTED) && !message.contains("again"), "{message}");
     let (_, message) = follow("frozen.csv");
-    assert!(
-        message.contains(DRIFTED) && message.contains("look like the training readings again"),
-        "{message}"
+    has(&message, &[DRIFTED, "look like the training readings again"]);
+    success("export --network n.json --format c99 --out bundle", folder.path());
+    has(
+        &read(folder.path(), "bundle/bundle_decode.h"),
+        &["half_widths[BUNDLE_OUTPUTS]"],
     );
-    json(
-        "export --network n.json --format c99 --json --out bundle",
-        folder.path(),
-    );
-    let exported = fs::read_to_string(folder.path().join("bundle/bundle_decode.h")).unwrap();
-    assert!(exported.contains("half_widths[BUNDLE_OUTPUTS]"), "{exported}");
 }
 
 #[test]
@@ -211,11 +186,10 @@ fn readings_without_a_drift_monitor_give_the_reason() {
             "decode --network n.json --data some.csv --out out.csv",
             "decode --network n.json --follow --data some.csv",
         ] {
-            let output = decoupler(command, path);
-            let message = String::from_utf8(output.stderr).unwrap();
-            assert!(output.status.success(), "{command}: {message}");
-            let reason = format!("Drift of the readings is not monitored: {reason}");
-            assert!(message.contains(&reason), "{command}: {message}");
+            has(
+                &said(command, path),
+                &[&format!("Drift of the readings is not monitored: {reason}")],
+            );
         }
     }
 }
@@ -225,10 +199,9 @@ fn a_choice_of_settings_gives_the_intervals() {
     let folder = recording();
     let train =
         "train --data r.csv --inputs a,b --targets x --hidden auto --budget 1 --json --out n.json --checkpoint c.json";
-    let output = decoupler(train, folder.path());
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let report = json(train, folder.path());
     // 90 % of the noise is within 0.9 × 0.05.
-    let half_width = report["targets"][0]["interval"]["half_width"].as_f64().unwrap();
+    let half_width = number(&report["targets"][0]["interval"], "half_width");
     assert!((half_width / 0.045 - 1.0).abs() < 0.2, "{half_width}");
     // The held-out answers of the choice were used: the networks of a cross-validation have a seed of their own.
     let file = NetworkFile::load(&folder.path().join("n.json")).unwrap();
@@ -263,19 +236,16 @@ fn the_optimism_of_a_random_split_is_reported() {
         let time = f64::from(frame) / 20.0;
         format!("{time},{}\n", (1.3 * time).sin() + 0.02 * rng.random_range(-1.0..1.0))
     });
-    fs::write(folder.path().join("r.csv"), lines.collect::<String>()).unwrap();
+    write(folder.path(), "r.csv", lines.collect::<String>());
     let arguments = "train --data r.csv --inputs c1 --targets c2 --split random --hidden 6 --epochs 40 --json";
     for folds in ["", " --folds 4"] {
         let report = json(&format!("{arguments}{folds}"), folder.path());
-        let warnings = report["warnings"].to_string();
+        let words = ["a random split would report an RMSE of", "split is optimistic by"];
+        has(&report["warnings"].to_string(), &words);
+        let target = &report["targets"][0];
         assert!(
-            warnings.contains("a random split would report an RMSE of") && warnings.contains("split is optimistic by"),
-            "{warnings}"
-        );
-        let interval = &report["targets"][0]["r2_interval"];
-        assert!(
-            interval[0].as_f64().unwrap() <= report["targets"][0]["r2"].as_f64().unwrap(),
-            "{interval}"
+            target["r2_interval"][0].as_f64().unwrap() <= number(target, "r2"),
+            "{target}"
         );
     }
 }
@@ -291,24 +261,23 @@ fn the_hysteresis_of_decoded_values_is_reported() {
         reading = reading.clamp(target - 0.5, target + 0.5);
         format!("{reading},{target}\n")
     });
-    fs::write(folder.path().join("r.csv"), lines.collect::<String>()).unwrap();
+    write(folder.path(), "r.csv", lines.collect::<String>());
     let arguments = "train --data r.csv --inputs c1 --targets c2 --split time --hidden 2 --epochs 30";
     let report = json(&format!("{arguments} --json"), folder.path());
     let found = &report["hysteresis"][0];
-    let percent = found["percent_of_range"].as_f64().unwrap();
-    assert!((9.0..13.0).contains(&percent), "{found}");
+    assert!((9.0..13.0).contains(&number(found, "percent_of_range")), "{found}");
     for branch in ["loading", "unloading"] {
-        let rmse = found[branch]["rmse"].as_f64().unwrap();
-        assert!((0.4..0.6).contains(&rmse), "{branch}: {found}");
+        assert!(
+            (0.4..0.6).contains(&number(&found[branch], "rmse")),
+            "{branch}: {found}"
+        );
     }
-    let text = String::from_utf8(decoupler(arguments, folder.path()).stdout).unwrap();
-    for expected in [
+    let rows = [
         "network, loading",
         "network, unloading",
         "hysteresis of the decoded values",
-    ] {
-        assert!(text.contains(expected), "{expected}: {text}");
-    }
+    ];
+    has(&success(arguments, folder.path()), &rows);
     // Samples drawn at random have lost their order in time.
     let report = json(
         &format!("{arguments} --split random --json").replace("--split time ", ""),
@@ -331,43 +300,28 @@ fn presses() -> TempDir {
         let [a, b, y] = presses[press].map(|value| value + 0.01 * rng.random_range(-1.0..1.0));
         text += &format!("{press},{a},{b},{y}\n");
     }
-    fs::write(folder.path().join("r.csv"), text).unwrap();
+    write(folder.path(), "r.csv", text);
     folder
 }
 
 const PRESSES: &str = "--data r.csv --inputs a,b --targets y --group press";
 
 #[test]
-fn a_random_split_is_compared_with_groups_if_there_are_any() {
+fn a_random_split_is_compared_with_groups_which_are_kept_together_if_there_are_any() {
     let folder = presses();
+    let train = format!("train {PRESSES} --hidden 8 --json --epochs");
     for split in ["--split random", "--split random --folds 5"] {
-        let report = json(
-            &format!("train {PRESSES} --hidden 8 {split} --epochs 60 --json"),
-            folder.path(),
-        );
-        let warnings = report["warnings"].to_string();
-        assert!(
-            warnings.contains("split by group") && warnings.contains("split is optimistic by"),
-            "{split}: {warnings}"
-        );
+        let said = warnings(&format!("{train} 60 {split}"), folder.path());
+        has(&said, &["split by group", "split is optimistic by"]);
     }
-    for split in ["--split random", "--split time", ""] {
-        let report = json(&format!("inspect {PRESSES} {split} --json"), folder.path());
-        assert_eq!(report["split"], if split.is_empty() { "group" } else { &split[8..] });
+    assert_eq!(json(&format!("{train} 5"), folder.path())["split"], "group");
+    for split in ["random", "time", "group"] {
+        let report = json(&format!("inspect {PRESSES} --split {split} --json"), folder.path());
+        assert_eq!(report["split"], split);
+        let compared = &report["targets"][0]["split"];
+        assert_eq!(compared["by"], "group", "{compared}");
+        assert!(number(compared, "random_rmse") < number(compared, "rmse"), "{compared}");
     }
-    let report = json(&format!("inspect {PRESSES} --split time --json"), folder.path());
-    let split = &report["targets"][0]["split"];
-    assert_eq!(split["by"], "group", "{split}");
-    assert!(split["random_rmse"].as_f64() < split["rmse"].as_f64(), "{split}");
-}
-
-#[test]
-fn groups_are_kept_together_unless_another_split_is_requested() {
-    let report = json(
-        &format!("train {PRESSES} --hidden 8 --epochs 5 --json"),
-        presses().path(),
-    );
-    assert_eq!(report["split"], "group");
 }
 
 /// A switch that predicts the state with 10 % flips, recorded without and with each row written twice: R² is (1 − 2·0.1)²
@@ -385,7 +339,7 @@ fn repeated_readings_keep_their_frequency() {
         "x,y\n".to_owned() + &rows.collect::<String>()
     };
     for copies in [1, 2] {
-        fs::write(folder.path().join("r.csv"), rows(copies, &mut rng)).unwrap();
+        write(folder.path(), "r.csv", rows(copies, &mut rng));
         let report = json("inspect --data r.csv --inputs x --targets y --json", folder.path());
         let target = &report["targets"][0];
         let value = target["r2"]["value"].as_f64().unwrap();
@@ -397,35 +351,6 @@ fn repeated_readings_keep_their_frequency() {
         );
         let ridge = &report["baselines"]["ridge"][0];
         assert!(ridge["r2"].as_f64().unwrap() > 0.5, "{ridge}");
-    }
-}
-
-#[test]
-fn options_that_need_targets_are_refused_without_them() {
-    let folder = recording();
-    for (arguments, cause) in [
-        (
-            "inspect --data r.csv --split time",
-            "--split needs --inputs and --targets",
-        ),
-        ("inspect --data r.csv --inputs a", "--targets: name the columns"),
-        ("inspect", "--data: name the file"),
-        (
-            "inspect --data r.csv --inputs a --targets x --test-data r.csv",
-            "--test-data: a recording is analysed by cross-validation",
-        ),
-        (
-            "inspect --data r.csv --inputs a --targets x --test-fraction 0.3",
-            "--test-fraction: a recording is analysed by cross-validation",
-        ),
-    ] {
-        let output = decoupler(arguments, folder.path());
-        let message = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
-        assert!(
-            message.contains(cause) && message.lines().count() == 1,
-            "{arguments}: {message}"
-        );
     }
 }
 
@@ -444,7 +369,7 @@ fn one_press(press: std::ops::Range<usize>) -> TempDir {
         let [a, b] = [0.3 * force, force.sqrt()].map(|value| value + rng.random_range(-0.03..0.03));
         text += &format!("{a},{b},{force}\n");
     }
-    fs::write(folder.path().join("r.csv"), text).unwrap();
+    write(folder.path(), "r.csv", text);
     folder
 }
 
@@ -453,29 +378,18 @@ fn a_single_press_is_learnt_wherever_it_is_and_what_its_test_lacks_is_said() {
     for press in [0..100, 250..350, 450..550, 880..980] {
         let folder = one_press(press.clone());
         let train = "train --data r.csv --inputs a,b --targets force --json";
-        let report = json(&format!("{train} --budget 1 --out n.json"), folder.path());
-        let warnings = report["warnings"].to_string();
-        for expected in [
-            "force: it is constant in the samples judged".to_owned(),
-            format!(
-                "force changes only once, in samples {} to",
-                if press.start == 880 { 681 } else { press.start + 1 }
-            ),
-        ] {
-            assert!(warnings.contains(&expected), "{press:?}: {expected}: {warnings}");
-        }
-        let is_first = warnings.contains("the first part was held out for testing in its place");
-        assert_eq!(is_first, press.start == 880, "{press:?}: {warnings}");
+        let said = warnings(&format!("{train} --budget 1 --out n.json"), folder.path());
+        let first = if press.start == 880 { 681 } else { press.start + 1 };
+        let once = format!("force changes only once, in samples {first} to");
+        has(&said, &["force: it is constant in the samples judged", &once]);
+        let is_first = said.contains("the first part was held out for testing in its place");
+        assert_eq!(is_first, press.start == 880, "{press:?}: {said}");
         // The press itself is learnt.
-        let output = decoupler("decode --network n.json --data r.csv --out o.csv", folder.path());
-        assert!(output.status.success(), "{press:?}");
-        let decoded = fs::read_to_string(folder.path().join("o.csv")).unwrap();
-        let middle = decoded.lines().nth(press.start + 51).unwrap();
-        let force: f64 = middle.split(',').next().unwrap().parse().unwrap();
-        assert!((force - 5.0).abs() < 0.5, "{press:?}: {middle}");
-        let report = json(&format!("{train} --folds 5 --hidden 2 --epochs 10"), folder.path());
-        let warnings = report["warnings"].to_string();
-        assert!(warnings.contains("force changes only once"), "{press:?}: {warnings}");
+        success("decode --network n.json --data r.csv --out o.csv", folder.path());
+        let force = column(&read(folder.path(), "o.csv"), "force")[press.start + 50];
+        assert!((force - 5.0).abs() < 0.5, "{press:?}: {force}");
+        let said = warnings(&format!("{train} --folds 5 --hidden 2 --epochs 10"), folder.path());
+        has(&said, &["force changes only once"]);
     }
 }
 
@@ -488,7 +402,7 @@ fn with_offset(offset: f64) -> TempDir {
         let [a, b, c, noise]: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
         text += &format!("{a},{b},{c},{}\n", offset + a - 0.5 * b + 0.2 * noise);
     }
-    fs::write(folder.path().join("r.csv"), text).unwrap();
+    write(folder.path(), "r.csv", text);
     folder
 }
 
@@ -505,27 +419,23 @@ fn a_large_offset_of_the_target_changes_no_error() {
             let of_model = tried
                 .iter()
                 .filter(|tried| tried["model"] == model || tried["model"].is_object() && model == "network");
-            let errors = of_model.map(|tried| tried["error"].as_f64().unwrap());
-            errors.fold(f64::INFINITY, f64::min)
+            of_model
+                .map(|tried| number(tried, "error"))
+                .fold(f64::INFINITY, f64::min)
         };
-        let r2 = report["targets"][0]["r2"].as_f64().unwrap();
-        [error("ridge"), error("network"), r2]
+        [error("ridge"), error("network"), number(&report["targets"][0], "r2")]
     });
     for (found, expected) in of_offset.into_iter().zip(errors) {
         assert!((found / expected - 1.0).abs() < 0.05, "{of_offset:?} {errors:?}");
     }
     // Spread of the noise over that of y, (0.2² / (1 + 0.5² + 0.2²))^½.
     assert!((errors[0] / 0.176 - 1.0).abs() < 0.15, "{errors:?}");
-    let folder = with_offset(1e17);
     let output = decoupler(
         "train --data r.csv --inputs a,b,c --targets y --budget 1",
-        folder.path(),
+        with_offset(1e17).path(),
     );
     let message = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        message.contains("every target is constant in the training set"),
-        "{message}"
-    );
+    has(&message, &["every target is constant in the training set"]);
 }
 
 #[test]
@@ -538,7 +448,7 @@ fn a_reading_that_equals_the_target_is_named_as_a_possible_leak() {
         let y = a + 0.3 * b + 0.05 * noise;
         text += &format!("{a},{b},{},{y}\n", y + 1e-6 * tiny);
     }
-    fs::write(folder.path().join("r.csv"), text).unwrap();
+    write(folder.path(), "r.csv", text);
     for command in [
         "train --data r.csv --inputs a,b,leak --targets y --hidden 2 --epochs 10 --json",
         "train --data r.csv --inputs a,b,leak --targets y --hidden 2 --epochs 10 --folds 3 --json",
@@ -546,19 +456,14 @@ fn a_reading_that_equals_the_target_is_named_as_a_possible_leak() {
     ] {
         let report = json(command, folder.path());
         let warnings = report["warnings"].to_string();
-        assert!(
-            warnings.contains("leak equals the target y up to scale and offset"),
-            "{command}: {warnings}"
-        );
+        has(&warnings, &["leak equals the target y up to scale and offset"]);
         // An error of 1e-6 is certain to be small.
-        assert!(
-            !warnings.contains("record longer") && !report.to_string().contains("twice the samples would"),
-            "{report}"
-        );
+        let asks_for_more =
+            warnings.contains("record longer") || report.to_string().contains("twice the samples would");
+        assert!(!asks_for_more, "{report}");
     }
     let honest = "train --data r.csv --inputs a,b --targets y --hidden 2 --epochs 10 --json";
-    let warnings = json(honest, folder.path())["warnings"].to_string();
-    assert!(!warnings.contains("up to scale and offset"), "{warnings}");
+    assert!(!warnings(honest, folder.path()).contains("up to scale and offset"));
 }
 
 #[test]
@@ -567,7 +472,7 @@ fn a_training_on_few_rows_has_one_outcome() {
     for rows in [1, 2, 3, 4, 5, 8] {
         let line = |row: u32| format!("{},{},{}\n", row, row * row % 5, 3 * row + 1);
         let text: String = (0..rows).map(line).collect();
-        fs::write(folder.path().join("few.csv"), format!("a,b,y\n{text}")).unwrap();
+        write(folder.path(), "few.csv", format!("a,b,y\n{text}"));
         for options in ["--split time", "--split random", "--split random --intervals always"] {
             let arguments =
                 format!("train --data few.csv --inputs a,b --targets y --hidden 2 --epochs 3 {options} --json");

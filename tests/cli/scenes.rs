@@ -1,21 +1,10 @@
 //! Scenes, inputs and decoders in the terminal.
 
-use std::{fs, path::Path};
+use std::fs;
 
 use serde_json::Value;
 
-use crate::{printed::success, terminal::decoupler};
-
-fn failure(arguments: &str, folder: &Path, status: i32) -> String {
-    let output = decoupler(arguments, folder);
-    let text = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(status), "{arguments}: {text}");
-    assert!(
-        text.starts_with("error: ") && text.lines().count() == 1,
-        "{arguments}: {text}"
-    );
-    text
-}
+use crate::calls::{has, json, number, read, refused, said, success};
 
 const SMALL: &str =
     "--array 3x4_2x12 --hidden 4 --epochs 20 --samples 300 --set validation-samples=30 --set test-samples=30";
@@ -23,33 +12,31 @@ const SMALL: &str =
 #[test]
 fn training_reports_decoders_model_based_errors_and_size_of_the_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let report = |arguments: &str| -> Value {
-        serde_json::from_str(&success(&format!("train {SMALL} --json {arguments}"), folder.path())).unwrap()
-    };
+    let report = |arguments: &str| json(&format!("train {SMALL} --json {arguments}"), folder.path());
     let known = report("--preset best --noise 1e-3");
     for name in ["mean", "ridge", "network", "network_f32", "rbf", "newton", "polish"] {
         for figure in ["z_percent", "z_mm", "frame_us"] {
-            let value = known["decoders"][name][figure].as_f64();
-            assert!(value.is_some_and(|value| value > 0.0), "{name} {figure}: {value:?}");
+            assert!(number(&known["decoders"][name], figure) > 0.0, "{name} {figure}");
         }
     }
-    assert!(known["model_based"]["z_percent"].as_f64().unwrap() > 0.0);
-    assert_eq!((&known["unknowns"], &known["equations"]), (&12.into(), &36.into()));
-    assert_eq!(known["networks"], 3);
+    assert!(number(&known["model_based"], "z_percent") > 0.0);
+    assert_eq!(
+        ["unknowns", "equations", "networks"].map(|name| number(&known, name)),
+        [12.0, 36.0, 3.0]
+    );
     assert_eq!(known["published"], Value::Null);
     let sideways = report("--preset best --rows 2 --axes xyz --loading smooth:4 --decoder newton,mean");
     assert_eq!(
-        (&sideways["unknowns"], &sideways["equations"]),
-        (&12.into(), &12.into())
+        ["unknowns", "equations"].map(|name| number(&sideways, name)),
+        [12.0, 12.0]
     );
-    let names: Vec<_> = sideways["decoders"].as_object().unwrap().keys().collect();
-    assert_eq!(names, ["mean", "newton"]);
+    assert!(sideways["decoders"].as_object().unwrap().keys().eq(["mean", "newton"]));
     let log = report("--inputs log --scaling whiten --loading indenter");
     assert_eq!(
         (&log["networks"], &log["inputs"]["scaling"]),
         (&1.into(), &"whitening".into())
     );
-    assert!(log["model_based"]["z_mm"].as_f64().unwrap() < 1e-10);
+    assert!(number(&log["model_based"], "z_mm") < 1e-10);
 }
 
 /// Twelve readings determine four nodes up to rounding, so that error ratios are meaningless; three readings do not.
@@ -88,7 +75,7 @@ fn simulated_samples_are_decoded_row_by_row() {
         path,
     );
     let lines = |name: &str| -> Vec<Vec<String>> {
-        let text = fs::read_to_string(path.join(name)).unwrap();
+        let text = read(path, name);
         text.lines()
             .map(|line| line.split(',').map(str::to_owned).collect())
             .collect()
@@ -118,8 +105,8 @@ fn simulated_samples_are_decoded_row_by_row() {
     expected[1..].reverse();
     assert_eq!(lines("turned_out.csv"), expected);
     fs::write(path.join("part.csv"), without[..6].join("\n")).unwrap();
-    let message = failure("decode --network net.json --data part.csv --out x.csv", path, 1);
-    assert!(message.contains("lines are not a multiple of 3 rows"), "{message}");
+    let part = "decode --network net.json --data part.csv --out x.csv";
+    refused(part, path, 1, "lines are not a multiple of 3 rows");
     success(
         "simulate --array 3x4_2x12 --rows 2 --samples 4 --noise 1e-3 --out row.csv",
         path,
@@ -134,7 +121,7 @@ fn a_trade_off_is_reported_in_text_and_json() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = "trade --array 2x3_2x9 --hidden 2,3 --epochs 5 --samples 60 --set test-samples=20 --noise 0,1e-2 \
                      --under-percent 1e-6 --under-us 1e9";
-    let report: Value = serde_json::from_str(&success(&format!("{arguments} --json"), folder.path())).unwrap();
+    let report = json(&format!("{arguments} --json"), folder.path());
     let levels = report["levels"].as_array().unwrap();
     assert_eq!(levels.len(), 2);
     for level in levels {
@@ -152,56 +139,13 @@ fn a_trade_off_is_reported_in_text_and_json() {
         &format!("{arguments} --preset best --decoder newton,network"),
         folder.path(),
     );
-    assert!(
-        text.contains("Fastest under") && text.contains("Network f32") && !text.contains("paper  "),
-        "{text}"
-    );
-}
-
-/// With noise only in the test, some points are worse than the mean, and each of them has a remark.
-#[test]
-fn a_point_worse_than_the_mean_has_a_remark() {
-    let folder = tempfile::tempdir().unwrap();
-    let arguments = "trade --array 2x3_2x9 --hidden 2 --epochs 30 --samples 40 --set test-samples=20 --noise 3e-1 --set noise-in=test \
-                     --preset paper --decoder mean,ridge,network";
-    let report: Value = serde_json::from_str(&success(&format!("{arguments} --json"), folder.path())).unwrap();
-    let points = report["levels"][0]["points"].as_array().unwrap();
-    let error = |point: &Value| point["z_mm"].as_f64().unwrap();
-    let of_mean = error(points.iter().find(|point| point["decoder"] == "mean").unwrap());
-    let worse = Vec::from_iter(points.iter().filter(|point| error(point) > 1.001 * of_mean));
-    assert!(!worse.is_empty(), "{points:?}");
-    for point in worse {
-        let remark = point["remarks"][0].as_str().unwrap();
-        assert!(remark.contains("times that of always answering the mean"), "{remark}");
-    }
-    let text = String::from_utf8(decoupler(arguments, folder.path()).stderr).unwrap();
-    assert!(
-        text.contains("warning: Network, paper preset, 2 hidden: ") || text.contains("warning: Ridge, paper preset: "),
-        "{text}"
-    );
-}
-
-#[test]
-fn errors_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let cases = [
-        ("train --preset worst", "paper or best"),
-        ("train --rows some", "all, known"),
-        ("train --axes xy", "z or xyz"),
-        ("train --loading smooth", "smooth:MM"),
-        ("train --inputs volts", "resistance, conductance or log"),
-        ("train --scaling none", "minmax or whiten"),
-        ("train --noise -1", "0 or more"),
-        ("train --noise 2", "from 0 to 1"),
-        ("train --noise 0,1", "is not a number"),
-        ("train --decoder knn", "rbf, fuzzy, newton or polish"),
-        ("simulate --decoder mean,ridge", "only one here"),
-        ("trade --hidden 0", "from 1"),
-    ];
-    for (arguments, expected) in cases {
-        let message = failure(arguments, folder.path(), 2);
-        assert!(message.contains(expected), "{arguments}: {message}");
-    }
-    let message = failure("train --rows 11", folder.path(), 2);
-    assert!(message.contains("rows 1 to 10"), "{message}");
+    has(&text, &["Fastest under", "Network f32"]);
+    assert!(!text.contains("paper  "), "{text}");
+    // With noise only in the test, some points are worse than the mean, and have a remark.
+    let noisy = "trade --array 2x3_2x9 --hidden 2 --epochs 30 --samples 40 --set test-samples=20 --noise 3e-1 \
+                 --set noise-in=test --preset paper --decoder mean,ridge,network";
+    let message = said(noisy, folder.path());
+    let is_remark =
+        |line: &str| line.starts_with("warning: ") && line.contains("times that of always answering the mean");
+    assert!(message.lines().any(is_remark), "{message}");
 }

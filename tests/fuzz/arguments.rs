@@ -40,16 +40,12 @@ fn check(arguments: &[String], folder: &Path) -> bool {
 #[test]
 fn any_input() {
     let folder = tempfile::tempdir().unwrap();
-    replay!(|bytes: &[u8]| {
+    replay!(1, |bytes: &[u8]| {
         let text = String::from_utf8_lossy(bytes).replace('\0', "");
         let arguments = Vec::from_iter(text.split_whitespace().map(str::to_owned));
         // Without a command the program would open its window.
-        if arguments
-            .first()
-            .is_some_and(|first| first == "simulate" || first == "train")
-        {
-            check(&arguments, folder.path());
-        }
+        let is_command = |first: &String| first == "simulate" || first == "train";
+        usize::from(arguments.first().is_some_and(is_command) && check(&arguments, folder.path()))
     });
 }
 

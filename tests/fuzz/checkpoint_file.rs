@@ -46,7 +46,7 @@ fn any_input() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     let small = trained().map(|run| run.settings().source);
-    replay!(|bytes: &[u8]| {
+    replay!(0, |bytes: &[u8]| {
         for bytes in [Some(bytes.to_vec()), resealed(bytes)].into_iter().flatten() {
             fs::write(&path, bytes).unwrap();
             match CheckpointFile::load(&path) {
@@ -64,5 +64,6 @@ fn any_input() {
                 }
             }
         }
+        0
     });
 }

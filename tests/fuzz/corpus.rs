@@ -1,24 +1,27 @@
 //! Replaying a corpus of inputs, each also damaged in ways that no format expects.
 
-/// Calls `$check` with every file in the corpus of the enclosing test: `__fuzz__/<module>__<test>/corpus`.
+/// Calls `$check` with every file in the corpus of the enclosing test, `__fuzz__/<module>__<test>/corpus`, and with the file
+/// damaged as by [`damaged`]; it returns how much of its input is accepted: at least `$least` in all.
 ///
-/// Each file is also damaged as by [`damaged`]. Nothing random is added, so the same files give the same result. `cargo bolero test <module>::<test>` (libFuzzer,
-/// run by hand) mutates them guided by code coverage, and adds what it finds.
+/// Nothing random is added, so the same files give the same result. `cargo bolero test <module>::<test>` (libFuzzer, run by
+/// hand) mutates them guided by code coverage, and adds what it finds.
 macro_rules! replay {
-    ($check:expr) => {
-        let replayed = std::sync::atomic::AtomicUsize::new(0);
+    ($least:expr, $check:expr) => {
+        use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+        let (replayed, accepted) = (AtomicUsize::new(0), AtomicUsize::new(0));
         bolero::check!()
             .with_iterations(0)
             .with_test_time(std::time::Duration::MAX)
             .for_each(|input: &[u8]| {
-                replayed.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                $check(input);
+                replayed.fetch_add(1, Relaxed);
+                accepted.fetch_add($check(input), Relaxed);
                 for input in $crate::corpus::damaged(input) {
-                    $check(&input[..]);
+                    accepted.fetch_add($check(&input[..]), Relaxed);
                 }
             });
-        let replayed = replayed.into_inner();
+        let (replayed, accepted): (usize, usize) = (replayed.into_inner(), accepted.into_inner());
         assert!(replayed >= 2, "the corpus has {replayed} files");
+        assert!(($least..).contains(&accepted), "only {accepted} inputs are accepted");
     };
 }
 pub(crate) use replay;

@@ -18,7 +18,6 @@ mod import;
 mod input_lines;
 mod live_lines;
 mod mutation;
-mod names;
 mod network_file;
 mod readings;
 mod recipe_file;

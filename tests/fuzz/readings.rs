@@ -36,19 +36,11 @@ fn check(bytes: &[u8], max_lines: usize) {
 
 #[test]
 fn any_input() {
-    replay!(|bytes: &[u8]| {
+    replay!(0, |bytes: &[u8]| {
         for max_lines in [1, 2, 100] {
             check(bytes, max_lines);
         }
         for_each_seed(100, |rng| check(&mutated(bytes, rng), rng.random_range(1..5)));
-    });
-}
-
-#[test]
-fn random_bytes_give_only_valid_resistances() {
-    for_each_seed(300, |rng| {
-        let length = rng.random_range(0..200);
-        let bytes: Vec<u8> = (0..length).map(|_| rng.random()).collect();
-        check(&bytes, 2);
+        0
     });
 }

@@ -54,7 +54,7 @@ fn damage_affects_only_the_damaged_file_and_changes_no_file() {
 /// Reads each input as a run, as the pinned runs, and as a name.
 #[test]
 fn any_input() {
-    replay!(|bytes: &[u8]| {
+    replay!(0, |bytes: &[u8]| {
         for name in ["runs/run-1.json", "runs/run-1.name.json", "runs/pinned.json"] {
             let folder = tempfile::tempdir().unwrap();
             fs::create_dir(folder.path().join("runs")).unwrap();
@@ -73,5 +73,6 @@ fn any_input() {
             let (again, _) = RunFolder::open(&folder.path().join("runs")).unwrap();
             assert_eq!(again.runs(), found.runs(), "{name}");
         }
+        0
     });
 }

@@ -1,8 +1,10 @@
-use std::fs;
+use serde_json::json;
 
-use serde_json::{Value, json};
-
-use super::driver::{fill, folder_with, merged, results, six, success};
+use super::driver::{fill, folder_with, merged, results, six};
+use crate::{
+    calls::{self, number, success, write},
+    commands::without_times,
+};
 
 #[test]
 fn shards_give_the_results_of_one_program_and_of_train() {
@@ -33,8 +35,7 @@ fn shards_give_the_results_of_one_program_and_of_train() {
             .eq(expected.iter().flatten().map(|(hidden, seed)| (hidden, seed)))
     );
     let line = "train --array 10x6_3x18 --samples 100 --epochs 8 --decoder ridge,network --hidden 10 --seed 7 --json";
-    let train: Value = serde_json::from_str(&success(line, folder)).unwrap();
-    assert_eq!(trials[5]["result"], without_times(train));
+    assert_eq!(trials[5]["result"], without_times(calls::json(line, folder)));
     success("sweep --merge shards --out table.csv", folder);
     let mut table = csv::Reader::from_path(folder.join("table.csv")).unwrap();
     let headings = table.headers().unwrap().clone();
@@ -43,7 +44,7 @@ fn shards_give_the_results_of_one_program_and_of_train() {
     for (record, trial) in table.records().map(Result::unwrap).zip(trials) {
         assert_eq!(record[hidden], trial["options"]["hidden"].to_string());
         let z_mm: f64 = record[z_mm].parse().unwrap();
-        assert_eq!(Some(z_mm), trial["result"]["errors"]["z_mm"].as_f64());
+        assert_eq!(z_mm, number(&trial["result"]["errors"], "z_mm"));
         assert!(record[seconds].parse::<f64>().unwrap() > 0.0);
     }
 }
@@ -62,20 +63,10 @@ fn running_again_trains_only_missing_trials() {
         "axes": {"seed": [9, "7", 0], "hidden": [10, 3, "4"]},
         "train": {"array": "10x6_3x18", "samples": 100, "epochs": 8, "decoder": "network,ridge", "preset": "paper"},
     });
-    fs::write(folder.join("sweep.json"), more.to_string()).unwrap();
+    write(folder, "sweep.json", more.to_string());
     let more = fill("--out runs", folder);
     assert_eq!((&more["present"], &more["trained"]), (&json!(6), &json!(3)));
     let after = results(&folder.join("runs"));
     assert!(after.is_superset(&before) && after.len() == 9);
     assert_eq!(merged("runs", folder)["trials"].as_array().unwrap().len(), 9);
-}
-
-/// Removes the times from the output of `train --json`.
-fn without_times(mut report: Value) -> Value {
-    report.as_object_mut().unwrap().remove("epoch_ms");
-    for decoder in report["decoders"].as_object_mut().unwrap().values_mut() {
-        let is_time = |name: &String| ["frame_us", "fit_seconds"].contains(&name.as_str());
-        decoder.as_object_mut().unwrap().retain(|name, _| !is_time(name));
-    }
-    report
 }

@@ -2,7 +2,8 @@ use std::fs;
 
 use serde_json::Value;
 
-use super::driver::{failure, fill, folder_with, merged, six};
+use super::driver::{fill, folder_with, incomplete, merged, six};
+use crate::calls::refused;
 
 #[test]
 fn merging_lists_missing_and_conflicting_trials() {
@@ -23,7 +24,7 @@ fn merging_lists_missing_and_conflicting_trials() {
         whole,
         "the folders complement each other"
     );
-    let (output, message) = failure("sweep --merge runs --spec sweep.json --out table.csv", folder, 1);
+    let (output, message) = incomplete("sweep --merge runs --spec sweep.json --out table.csv", folder);
     assert!(output.contains("missing: trial 2 (hidden 3, seed 7)\n"), "{output}");
     assert!(message.contains("1 missing, 0 conflicting"), "{message}");
     assert_eq!(fs::read_to_string(folder.join("table.csv")).unwrap().lines().count(), 6);
@@ -39,7 +40,7 @@ fn merging_lists_missing_and_conflicting_trials() {
     assert!(heading.contains(&old), "the checksum is the usual CRC-32");
     let heading = heading.replace(&old, &format!("{:08x}", crc32(changed.as_bytes())));
     fs::write(&path, format!("{heading}\"run\":{changed}}}\n")).unwrap();
-    let (output, message) = failure("sweep --merge runs others --out table.json", folder, 1);
+    let (output, message) = incomplete("sweep --merge runs others --out table.json", folder);
     let line = output.lines().find(|line| line.starts_with("conflicting: ")).unwrap();
     assert!(
         line.contains(&id(4, 0)) && line.contains("runs") && line.contains("others"),
@@ -56,7 +57,7 @@ fn merging_lists_missing_and_conflicting_trials() {
         folder.join("others").join(id(10, 0)),
     )
     .unwrap();
-    let (output, message) = failure("sweep --merge others --spec sweep.json --out table.csv", folder, 1);
+    let (output, message) = incomplete("sweep --merge others --spec sweep.json --out table.csv", folder);
     assert!(
         output.contains("checksum") && output.contains("its name belongs to another trial"),
         "{output}"
@@ -94,7 +95,6 @@ fn an_invalid_merge_is_refused() {
         ("--spec sweep.json --out runs --shard 3/2", 2, "I/N"),
         ("--spec sweep.json --out sweep.json", 1, "cannot create the folder"),
     ] {
-        let (_, message) = failure(&format!("sweep {arguments}"), folder, status);
-        assert!(message.contains(expected), "{arguments}: {message}");
+        refused(&format!("sweep {arguments}"), folder, status, expected);
     }
 }

@@ -4,7 +4,12 @@ use std::{fs, path::Path};
 
 use serde_json::{Value, json};
 
-use super::driver::{failure, fill, folder_with, merged, names, run, success};
+use super::driver::{fill, folder_with, merged};
+use crate::{
+    calls::{self, has, read, refused, success, write},
+    folders::names,
+    terminal::decoupler,
+};
 
 fn write_recording(path: &Path) {
     let mut text = "time,a,b,c,fx (N),fz (N)\n".to_owned();
@@ -56,14 +61,13 @@ fn parts_of_a_sweep_from_different_folders_merge_to_the_table_of_one_process() {
     // No file contains the folder of the recording.
     let place = folder.to_str().unwrap();
     for name in names(&folder.join("whole")) {
-        let text = fs::read_to_string(folder.join("whole").join(&name)).unwrap();
+        let text = read(&folder.join("whole"), &name);
         assert!(!text.contains(place), "{name}: {text}");
     }
     success("sweep --merge whole --out table.csv", folder);
-    let table = fs::read_to_string(folder.join("table.csv")).unwrap();
-    assert!(
-        table.lines().next().unwrap().contains("result.targets.fx.rmse"),
-        "{table}"
+    has(
+        read(folder, "table.csv").lines().next().unwrap(),
+        &["result.targets.fx.rmse"],
     );
 }
 
@@ -80,7 +84,7 @@ fn a_trial_has_the_output_of_train() {
         let method = options["method"].as_str().unwrap();
         let of_trial = format!("--epochs 8 --hidden {hidden} --method {method} --seed {seed}");
         let train = format!("train --data press.csv --inputs a..c --targets fx,fz --intervals never {of_trial} --json");
-        let printed: Value = serde_json::from_str(&success(&train, folder)).unwrap();
+        let printed = calls::json(&train, folder);
         for field in ["targets", "baselines", "starts", "samples", "warnings"] {
             assert_eq!(trial["result"][field], printed[field], "{field}, {options}");
         }
@@ -119,7 +123,7 @@ fn arguments_a_recipe_and_a_recording_in_the_specification_are_the_same_trials()
         "axes": axes,
     });
     for (name, specification) in [("recipe", recipe), ("recording", recording)] {
-        fs::write(folder.join(name).with_extension("json"), specification.to_string()).unwrap();
+        write(folder, &format!("{name}.json"), specification.to_string());
         success(&format!("sweep --spec {name}.json --out {name} --json"), folder);
         let table = merged(name, folder);
         assert_eq!((trials(&table).len(), shared(&table, &whole)), (4, 4), "{name}");
@@ -130,19 +134,17 @@ fn arguments_a_recipe_and_a_recording_in_the_specification_are_the_same_trials()
 fn invalid_sweeps_of_recordings_are_refused() {
     let folder = folder_with(&eight());
     let folder = folder.path();
-    let (_, message) = failure("sweep --spec sweep.json --out runs", folder, 2);
-    assert!(message.contains("press.csv"), "{message}");
+    refused("sweep --spec sweep.json --out runs", folder, 2, "press.csv");
     write_recording(&folder.join("press.csv"));
-    let cases = [
+    for (option, value, expected) in [
         ("array", json!("10x6_3x18"), "a recording (--data) has no array"),
         ("folds", json!(3), "a sweep manages its results"),
         ("split", json!("group"), "give the group column with --group"),
-    ];
-    for (option, value, expected) in cases {
+    ] {
         let mut specification = eight();
         specification["train"][option] = value;
-        fs::write(folder.join("wrong.json"), specification.to_string()).unwrap();
-        let output = run("sweep --spec wrong.json --out runs", folder);
+        write(folder, "wrong.json", specification.to_string());
+        let output = decoupler("sweep --spec wrong.json --out runs", folder);
         let message = String::from_utf8(output.stderr).unwrap();
         assert!(
             !output.status.success() && message.contains(expected),

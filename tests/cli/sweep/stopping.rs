@@ -1,19 +1,20 @@
 use std::fs::{self, File};
-#[cfg(target_os = "linux")]
-use std::process::Command;
 
 use serde_json::{Value, json};
-#[cfg(target_os = "linux")]
 use tempfile::TempDir;
 
-use super::driver::{command, failure, fill, folder_with, merged, names, results, six, spawn, wait_until};
+use super::driver::{fill, folder_with, incomplete, merged, results, six};
+use crate::{
+    calls::{SIGNALS, has, number, signal, spawn, wait_until},
+    folders::names,
+};
 
 #[test]
 fn a_killed_sweep_keeps_finished_trials() {
     let folder = folder_with(&six());
     let folder = folder.path();
     let runs = folder.join("runs");
-    let mut child = spawn(&mut command("sweep --spec sweep.json --out runs --threads 1", folder));
+    let mut child = spawn("sweep --spec sweep.json --out runs --threads 1", folder);
     wait_until("two results", || runs.is_dir() && results(&runs).len() >= 2);
     child.kill().unwrap();
     child.wait().unwrap();
@@ -50,29 +51,16 @@ fn leftovers_of_a_program_killed_after_its_result_are_removed() {
 fn two_programs_fill_one_folder() {
     let folder = folder_with(&six());
     let folder = folder.path();
-    let start = || {
-        spawn(&mut command(
-            "sweep --spec sweep.json --out runs --threads 1 --json",
-            folder,
-        ))
-    };
+    let start = || spawn("sweep --spec sweep.json --out runs --threads 1 --json", folder);
     let outputs = [start(), start()].map(|child| child.wait_with_output().unwrap());
     let reports = outputs.map(|output| {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_slice::<Value>(&output.stdout).unwrap()
     });
-    let sum = |field: &str| {
-        reports
-            .iter()
-            .map(|report| report[field].as_u64().unwrap())
-            .sum::<u64>()
-    };
-    assert_eq!(sum("trained"), 6, "no trial is trained twice");
-    assert_eq!(
-        sum("present") + sum("elsewhere"),
-        6,
-        "each leaves the others' trials to them"
-    );
+    let sum = |field: &str| reports.iter().map(|report| number(report, field)).sum::<f64>();
+    assert_eq!(sum("trained"), 6.0, "no trial is trained twice");
+    let left = sum("present") + sum("elsewhere");
+    assert_eq!(left, 6.0, "each leaves the others' trials to them");
     assert_eq!(names(&folder.join("runs")).len(), 6, "the results");
 }
 
@@ -95,50 +83,39 @@ fn a_trial_of_another_program_is_left_to_it_until_it_ends() {
     }
     let other = File::create(runs.join(format!("{first}.claim"))).unwrap();
     other.lock().unwrap();
-    let counts = |report: &Value| ["present", "trained", "elsewhere"].map(|field| report[field].as_u64().unwrap());
-    assert_eq!(counts(&fill("--out runs", folder)), [1, 1, 1], "the lock is respected");
+    let counts = |report: &Value| ["present", "trained", "elsewhere"].map(|field| number(report, field));
+    assert_eq!(counts(&fill("--out runs", folder)), [1.0; 3], "the lock is respected");
     assert!(result(&second).exists() && !result(&first).exists());
-    let (output, _) = failure("sweep --merge runs --out table.csv", folder, 1);
-    assert!(
-        output.contains(&format!("missing: trial {first} (begun, not finished)\n")),
-        "{output}"
-    );
+    let (output, _) = incomplete("sweep --merge runs --out table.csv", folder);
+    has(&output, &[&format!("missing: trial {first} (begun, not finished)\n")]);
     drop(other);
-    assert_eq!(counts(&fill("--out runs", folder)), [2, 1, 0]);
+    assert_eq!(counts(&fill("--out runs", folder)), [2.0, 1.0, 0.0]);
     assert_eq!(merged("runs", folder), trials);
 }
 
 /// Stops a trial of this many epochs after its start; returns its folder, the exit status and standard error.
-#[cfg(target_os = "linux")]
-fn stopped_by(signal: &str, epochs: usize) -> (TempDir, i32, String) {
+fn stopped_by(name: &str, epochs: usize) -> (TempDir, i32, String) {
     let folder = folder_with(&json!({
         "train": {"array": "10x6_3x18", "samples": 200, "hidden": 6, "max-fail": 1_000_000, "min-gradient": 0,
                   "decoder": "network", "epochs": epochs},
         "axes": {"seed": [3]},
     }));
-    let mut command = Command::new("env");
-    command.args(["--default-signal", env!("CARGO_BIN_EXE_decoupler")]);
-    command
-        .args("sweep --spec sweep.json --out runs".split(' '))
-        .current_dir(folder.path());
-    let child = spawn(&mut command);
+    let child = spawn("sweep --spec sweep.json --out runs", folder.path());
     let runs = folder.path().join("runs");
     let is_begun = || names(&runs).iter().any(|name| name.ends_with(".claim"));
     wait_until("the trial has started", || runs.is_dir() && is_begun());
-    let kill = format!("kill -{signal} {}", child.id());
-    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+    signal(name, &child);
     let output = child.wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     (folder, output.status.code().unwrap(), message)
 }
 
-#[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_trial_is_resumed_bit_for_bit() {
-    for (signal, status) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
+    for (name, status) in SIGNALS {
         // A busy machine may deliver the signal late.
         let attempts = [1000, 10_000, 100_000].into_iter();
-        let mut attempts = attempts.map(|epochs| (epochs, stopped_by(signal, epochs)));
+        let mut attempts = attempts.map(|epochs| (epochs, stopped_by(name, epochs)));
         let (epochs, (folder, ended, message)) = attempts.find(|(_, (_, ended, _))| *ended != 0).unwrap();
         let folder = folder.path();
         assert_eq!(ended, status, "{message}");

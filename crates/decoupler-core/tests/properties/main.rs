@@ -1,11 +1,9 @@
 //! Properties that hold for arbitrary inputs, drawn from a fixed seed.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-mod folds;
 mod scaling;
 mod sensor;
 mod surfaces;
-mod training;
 
 use proptest::test_runner::{Config, RngSeed};
 

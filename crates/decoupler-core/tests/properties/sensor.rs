@@ -61,41 +61,6 @@ fn largest_relative(a: impl IntoIterator<Item = f64>, b: impl IntoIterator<Item 
 proptest! {
     #![proptest_config(cases(64))]
 
-    /// With every length multiplied by `unit` and the resistance per millimetre divided by it.
-    #[test]
-    fn the_unit_of_length_does_not_matter(pressed in pressed(), exponent in -6.0..6.0_f64) {
-        let unit = 10_f64.powf(exponent);
-        let mut other = pressed.clone();
-        let geometry = &mut other.sensor.geometry;
-        for length_mm in [
-            &mut geometry.height_mm,
-            &mut geometry.row_x0_mm,
-            &mut geometry.row_pitch_mm,
-            &mut geometry.node_pitch_mm,
-            &mut geometry.column_y0_mm,
-            &mut geometry.column_pitch_mm,
-            &mut geometry.column_node_x0_mm,
-            &mut geometry.column_node_pitch_mm,
-        ] {
-            *length_mm *= unit;
-        }
-        other.sensor.resistivity_ohm_per_mm /= unit;
-        other.displacements_mm.iter_mut().for_each(|displacement_mm| *displacement_mm *= unit);
-        let off = largest_relative(other.resistances_ohm(), pressed.resistances_ohm());
-        prop_assert!(off < 1e-13, "{off:e}");
-    }
-
-    #[test]
-    fn the_origin_does_not_matter(pressed in pressed(), x_mm in -1e3..1e3_f64, y_mm in -1e3..1e3_f64) {
-        let mut other = pressed.clone();
-        other.sensor.geometry.row_x0_mm += x_mm;
-        other.sensor.geometry.column_node_x0_mm += x_mm;
-        other.sensor.geometry.column_y0_mm += y_mm;
-        // The coordinates lose three digits.
-        let off = largest_relative(other.resistances_ohm(), pressed.resistances_ohm());
-        prop_assert!(off < 1e-11, "{off:e}");
-    }
-
     /// A row is centred over the column-wires: its reflection along y is the row itself with its nodes and columns
     /// reversed.
     #[test]

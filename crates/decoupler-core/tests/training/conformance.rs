@@ -8,7 +8,7 @@ use decoupler_core::{
         ExampleSets, Examples, Method, RegularizationSettings, StoppingRules, Trainer, TrainerState, TrainingSettings,
     },
 };
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 
 use crate::problems::{start, trainer, training, wave};
 
@@ -66,6 +66,32 @@ fn the_gradient_agrees_with_central_differences_of_every_weight() {
     for ((now, before), slope) in steps.zip(slopes(&start())) {
         let found = (before - now) / 0.5;
         assert!((found - slope).abs() < 1e-8, "{found} {slope}");
+    }
+}
+
+#[test]
+fn the_order_of_the_samples_does_not_matter() {
+    let (inputs, targets) = training();
+    let backwards = Vec::from_iter((0..inputs.nrows()).rev());
+    for method in Method::all() {
+        let [(weights, mse), (others, other_mse)] = [false, true].map(|is_reversed| {
+            let mut problem = crate::problems::problem();
+            if is_reversed {
+                let [inputs, targets] = [&inputs, &targets].map(|values| values.select(Axis(0), &backwards));
+                problem.training = Examples::new(inputs.view(), targets.view());
+            }
+            let stopping = StoppingRules::default();
+            let mut trainer = Trainer::new(start(), problem, TrainingSettings { method, stopping }).unwrap();
+            trainer.step();
+            (trainer.present().weights().to_vec(), trainer.latest().training_mse)
+        });
+        assert!((mse - other_mse).abs() < 1e-9 * mse, "{method}: {mse} and {other_mse}");
+        let off = weights
+            .iter()
+            .zip(&others)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        assert!(off < 1e-7, "{method}: {off:e}");
     }
 }
 

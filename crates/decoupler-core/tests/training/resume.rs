@@ -13,19 +13,6 @@ fn run(trainer: &mut Trainer, epochs: usize) {
 }
 
 #[test]
-fn another_method_continues_from_the_current_weights() {
-    let [lm, .., gd] = Method::all();
-    let mut trainer = trainer(gd);
-    run(&mut trainer, 5);
-    let before = trainer.latest().training_mse;
-    trainer.continue_with(lm).unwrap();
-    trainer.step();
-    assert_eq!(trainer.latest().epoch, 6);
-    assert!(trainer.latest().training_mse < 0.5 * before);
-    assert_eq!(trainer.settings().method, lm);
-}
-
-#[test]
 fn more_epochs_continue_a_finished_training() {
     let few = StoppingRules {
         epochs: 3,

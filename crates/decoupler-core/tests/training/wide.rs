@@ -9,11 +9,6 @@ use ndarray::Array2;
 
 use crate::problems::wave;
 
-fn named(name: &str) -> Method {
-    let method = Method::all().into_iter().find(|method| method.short_name() == name);
-    method.expect("it is offered")
-}
-
 fn samples(shape: Shape, count: usize) -> (Array2<f64>, Array2<f64>) {
     let inputs = Array2::from_shape_fn((count, shape.inputs), |(row, column)| wave(row, column));
     let targets = Array2::from_shape_fn((count, shape.outputs), |(row, output)| {
@@ -34,7 +29,7 @@ fn problem(shape: Shape, count: usize) -> ExampleSets {
 fn begin(method: &str, shape: Shape, samples: usize) -> Result<Trainer, TrainingError> {
     let start = Mlp::from_weights(shape, (0..shape.weights()).map(|index| 0.3 * wave(index, 9)).collect());
     let settings = TrainingSettings {
-        method: named(method),
+        method: Method::named(method).unwrap(),
         stopping: StoppingRules::default(),
     };
     Trainer::new(start, problem(shape, samples), settings)
@@ -71,19 +66,21 @@ fn only_methods_that_factorise_refuse_a_very_wide_network() {
         outputs: 3,
     };
     let memory = MemoryBudget::System(16_000_000_000);
-    let refused = check_width(&named("br"), shape, 8, 1, memory).unwrap_err();
+    let refused = check_width(&Method::named("br").unwrap(), shape, 8, 1, memory).unwrap_err();
     assert!(
         matches!(refused, TrainingError::TooWide { trainings: 1, memory: of, .. } if of == memory),
         "{refused:?}"
     );
-    assert!(refused.to_string().contains("the machine has 16.0 GB"), "{refused}");
+    for words in ["the machine has 16.0 GB", "scg"] {
+        assert!(refused.to_string().contains(words), "{refused}");
+    }
     // 23 205 rows would take 4 GB.
     let shape = Shape {
         inputs: 220,
         hidden: 105,
         outputs: 3,
     };
-    check_width(&named("lm"), shape, 8, 1, memory).unwrap();
+    check_width(&Method::named("lm").unwrap(), shape, 8, 1, memory).unwrap();
     let mut trainer = begin("lm", shape, 8).unwrap();
     let start = trainer.latest().training_mse;
     trainer.step();

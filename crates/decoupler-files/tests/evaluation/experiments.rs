@@ -78,11 +78,15 @@ fn threads(count: usize) -> NonZero<usize> {
 }
 
 fn run(experiments: &[Experiment], thread_count: usize) -> Vec<ExperimentResults> {
-    let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
     let memory = MemoryBudget::System(8_000_000_000);
+    run_on(experiments, &TrialSamples::Drawn(memory), thread_count)
+}
+
+fn run_on(experiments: &[Experiment], samples: &TrialSamples, thread_count: usize) -> Vec<ExperimentResults> {
+    let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
     run_experiments(
         experiments,
-        &TrialSamples::Drawn(memory),
+        samples,
         threads(thread_count),
         || false,
         |finished| {
@@ -183,39 +187,44 @@ fn cross_validation_decouples_every_sample_with_a_network_that_was_not_trained_o
 
 #[test]
 fn cancelling_keeps_finished_trials() {
-    let experiment = small(Axis::integers(AxisKind::Hidden, [2, 3, 4]));
-    let trials_after = |asked_at_most: usize| {
-        let asked = AtomicUsize::new(0);
-        let mut results = ExperimentResults::new(experiment.clone());
-        let mut finished = 0;
-        run_experiments(
-            std::slice::from_ref(&experiment),
-            &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
-            threads(1),
-            || asked.fetch_add(1, Ordering::Relaxed) >= asked_at_most,
-            |one| {
-                assert_eq!(one.experiment, 0);
-                finished += 1;
-                assert_eq!(one.done, finished);
-                results.record(one.cell, one.outcome);
-            },
-        )
-        .unwrap();
-        (results, finished, asked.into_inner())
-    };
-    let (whole, finished, asked) = trials_after(usize::MAX);
-    assert!(finished == 9 && whole.is_complete());
-    let (results, finished, _) = trials_after(asked / 2);
-    assert!((3..9).contains(&finished) && !results.is_complete());
-    let kept = timeless(std::slice::from_ref(&results));
-    assert_eq!(kept.iter().map(Vec::len).sum::<usize>(), finished);
-    for (kept, whole) in kept.iter().zip(&timeless(&[whole])) {
-        assert!(kept.iter().all(|trial| whole.contains(trial)));
+    let folder = tempfile::tempdir().unwrap();
+    let setup = recording(folder.path());
+    let hidden = Axis::integers(AxisKind::Hidden, [2, 3, 4]);
+    let drawn = TrialSamples::Drawn(MemoryBudget::UNLIMITED);
+    for (experiment, samples, count) in [
+        (small(hidden.clone()), drawn, 9),
+        (on_recording(&setup, hidden, None), samples_of(&setup), 6),
+    ] {
+        let trials_after = |asked_at_most: usize| {
+            let asked = AtomicUsize::new(0);
+            let mut results = ExperimentResults::new(experiment.clone());
+            let mut finished = 0;
+            run_experiments(
+                std::slice::from_ref(&experiment),
+                &samples,
+                threads(1),
+                || asked.fetch_add(1, Ordering::Relaxed) >= asked_at_most,
+                |one| {
+                    finished += 1;
+                    assert_eq!((one.experiment, one.done), (0, finished));
+                    results.record(one.cell, one.outcome);
+                },
+            )
+            .unwrap();
+            (results, finished, asked.into_inner())
+        };
+        let (whole, finished, asked) = trials_after(usize::MAX);
+        assert!(finished == count && whole.is_complete());
+        let (results, finished, _) = trials_after(asked / 2);
+        assert!((2..count).contains(&finished) && !results.is_complete());
+        let kept = timeless(std::slice::from_ref(&results));
+        assert_eq!(kept.iter().map(Vec::len).sum::<usize>(), finished);
+        for (kept, whole) in kept.iter().zip(&timeless(&[whole])) {
+            assert!(kept.iter().all(|trial| whole.contains(trial)));
+        }
+        let is_tried_once = finished < 3 || kept.iter().all(|trials| !trials.is_empty());
+        assert!(is_tried_once, "every cell is tried once before any twice");
     }
-    assert!(
-        kept.iter().all(|trials| !trials.is_empty()),
-        "every cell is tried once before any twice"
-    );
 }
 
 #[test]
@@ -252,8 +261,7 @@ fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
     let mut experiment = small(Axis::integers(AxisKind::Hidden, [2, 512]));
     experiment.base = settings;
     experiment.base.starts = 1;
-    let by_name = |method: &Method| method.to_string().contains("Bayesian");
-    experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();
+    experiment.base.training.method = Method::named("br").unwrap();
     let results = &run(&[experiment], 2)[0];
     assert!(results.is_complete());
     assert_eq!((results.cells[0].trials.len(), results.cells[0].failures.len()), (3, 0));
@@ -269,8 +277,7 @@ fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
 #[test]
 fn cells_with_networks_worse_than_the_mean_are_named() {
     let mut experiment = small(Axis::integers(AxisKind::Epochs, [1, 60]));
-    let by_name = |method: &Method| method.short_name() == "gd";
-    experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();
+    experiment.base.training.method = Method::named("gd").unwrap();
     let results = &run(&[experiment], 2)[0];
     let z_mm = |errors: &TestErrors| errors.nodes().unwrap().z_mm;
     let worse = |cell: usize| {
@@ -337,19 +344,6 @@ fn samples_of(setup: &Setup) -> TrialSamples {
         .unwrap()
 }
 
-fn run_on(experiment: &Experiment, samples: &TrialSamples, thread_count: usize) -> ExperimentResults {
-    let mut results = ExperimentResults::new(experiment.clone());
-    run_experiments(
-        std::slice::from_ref(experiment),
-        samples,
-        threads(thread_count),
-        || false,
-        |finished| results.record(finished.cell, finished.outcome),
-    )
-    .unwrap();
-    results
-}
-
 #[test]
 fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
     let folder = tempfile::tempdir().unwrap();
@@ -357,7 +351,7 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
     let methods = Axis::names(AxisKind::Method, ["br", "lm"]);
     let splits = Axis::names(AxisKind::Split, SplitBy::ALL);
     let experiment = on_recording(&setup, methods, Some(splits));
-    let results = run_on(&experiment, &samples_of(&setup), 2);
+    let results = run_on(std::slice::from_ref(&experiment), &samples_of(&setup), 2).remove(0);
     assert!(results.is_complete());
     for (place, cell) in results.cells.iter().enumerate() {
         assert!(cell.failures.is_empty(), "{:?}", cell.failures);
@@ -420,36 +414,8 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
     assert_eq!(ridge(0)[0], ridge(0)[1]);
     assert_ne!(ridge(2)[0], ridge(2)[1]);
     assert_ne!(ridge(4)[0], ridge(4)[1]);
-    let again = run_on(&experiment, &samples_of(&setup), 3);
-    assert_eq!(timeless(&[results]), timeless(&[again]), "on any number of threads");
-}
-
-#[test]
-fn a_cancelled_experiment_on_a_recording_keeps_finished_trials() {
-    let folder = tempfile::tempdir().unwrap();
-    let setup = recording(folder.path());
-    let experiment = on_recording(&setup, Axis::integers(AxisKind::Hidden, [2, 3, 4]), None);
-    let samples = samples_of(&setup);
-    let trials_after = |asked_at_most: usize| {
-        let asked = AtomicUsize::new(0);
-        let mut results = ExperimentResults::new(experiment.clone());
-        run_experiments(
-            std::slice::from_ref(&experiment),
-            &samples,
-            threads(1),
-            || asked.fetch_add(1, Ordering::Relaxed) >= asked_at_most,
-            |one| results.record(one.cell, one.outcome),
-        )
-        .unwrap();
-        (results, asked.into_inner())
-    };
-    let (whole, asked) = trials_after(usize::MAX);
-    let (results, _) = trials_after(asked / 2);
-    let kept: usize = results.cells.iter().map(|cell| cell.trials.len()).sum();
-    assert!((2..5).contains(&kept) && whole.is_complete() && !results.is_complete());
-    for (kept, whole) in timeless(&[results]).iter().zip(&timeless(&[whole])) {
-        assert!(kept.iter().all(|trial| whole.contains(trial)));
-    }
+    let again = run_on(&[experiment], &samples_of(&setup), 3);
+    assert_eq!(timeless(&[results]), timeless(&again), "on any number of threads");
 }
 
 #[test]
@@ -497,7 +463,7 @@ fn tables_of_a_recording_have_its_error_measures_and_target_names() {
     let setup = recording(folder.path());
     let experiment = on_recording(&setup, Axis::integers(AxisKind::Hidden, [2, 4]), None);
     let samples = samples_of(&setup);
-    let mut results = run_on(&experiment, &samples, 2);
+    let mut results = run_on(std::slice::from_ref(&experiment), &samples, 2).remove(0);
     let TrialSamples::Recorded { problem, .. } = &samples else {
         panic!("the samples are recorded");
     };

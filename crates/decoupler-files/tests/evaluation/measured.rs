@@ -155,45 +155,13 @@ fn every_decoder_without_a_sensor_model_is_measured() {
 }
 
 #[test]
-fn a_measured_training_resumes_bit_for_bit() {
-    let set = recording(300, &[0], 5);
-    let whole = trained(settings(RowModel::Shared), &set, 250);
-    let (first, test) = split(&set, 250);
-    let mut paused = Run::with_baselines(
-        settings(RowModel::Shared),
-        RunSets::new(first.clone(), test.clone()),
-        None,
-        &Job::UNINTERRUPTED,
-    )
-    .unwrap();
-    for _ in 0..7 {
-        paused.step();
-    }
-    let mut resumed = Run::with_baselines(
-        *paused.settings(),
-        RunSets::new(first, test),
-        Some(paused.states()),
-        &Job::UNINTERRUPTED,
-    )
-    .unwrap();
-    while resumed.step().is_none() {}
-    assert_eq!(resumed.network(), whole.network());
-}
-
-#[test]
 fn mismatched_sets_are_named() {
     let set = recording(100, &[0, 1], 6);
     let (training, _) = split(&set, 80);
     let run = |rows, split: &Split, test| {
-        Run::with_baselines(
-            settings(rows),
-            RunSets::new(split.clone(), test),
-            None,
-            &Job::UNINTERRUPTED,
-        )
-        .err()
-        .unwrap()
-        .to_string()
+        let sets = RunSets::new(split.clone(), test);
+        let run = Run::with_baselines(settings(rows), sets, None, &Job::UNINTERRUPTED);
+        run.err().unwrap().to_string()
     };
     let narrow = Dataset::new(
         Array2::zeros((4, 3)),

@@ -140,56 +140,48 @@ fn png_has_300_dots_per_inch_and_text_in_the_programs_fonts() {
     assert!(ink > 200, "{ink} dark pixels");
 }
 
-#[test]
-fn heat_maps_have_each_value_in_its_cell() {
-    let values = Array2::from_shape_vec((2, 2), vec![1.0, 2.5, f64::NAN, 4.0]).unwrap();
-    let map = HeatMap {
+fn heat_map(rows: &[&str], columns: &[&str], values: &[f64], value_axis: PlotAxis) -> HeatMap {
+    let shape = (rows.len(), columns.len());
+    let texts = |texts: &[&str]| texts.iter().map(|&text| text.to_owned()).collect();
+    HeatMap {
         x_name: "hidden nodes".to_owned(),
         y_name: "array".to_owned(),
-        columns: vec!["6".to_owned(), "8".to_owned()],
-        rows: vec!["a < b & c".to_owned(), "d".to_owned()],
-        values,
-        notes: Array2::default((2, 2)),
-        value_axis: PlotAxis::linear("Z error (%)"),
+        columns: texts(columns),
+        rows: texts(rows),
+        values: Array2::from_shape_vec(shape, values.to_vec()).unwrap(),
+        notes: Array2::default(shape),
+        value_axis,
         colours: SequentialMap::default(),
-    };
-    let empty = HeatMap {
-        columns: Vec::new(),
-        rows: Vec::new(),
-        values: Array2::zeros((0, 0)),
-        notes: Array2::default((0, 0)),
-        ..map.clone()
-    };
+    }
+}
+
+#[test]
+fn heat_maps_have_each_value_in_its_cell_and_logarithmic_colours_on_request() {
+    let axis = PlotAxis::linear("Z error (%)");
+    let map = heat_map(
+        &["a < b & c", "d"],
+        &["6", "8"],
+        &[1.0, 2.5, f64::NAN, 4.0],
+        axis.clone(),
+    );
     let picture = Figure::from(map).draw();
     for word in ["1.00", "2.50", "–", "4.00", "a < b & c", "hidden nodes", "Z error (%)"] {
         assert!(texts(&picture).iter().any(|text| text == word), "{word}");
     }
     picture.png().unwrap();
-    Figure::from(empty).draw().png().unwrap();
-}
+    Figure::from(heat_map(&[], &[], &[], axis)).draw().png().unwrap();
 
-#[test]
-fn colours_of_a_heat_map_are_logarithmic_on_request() {
-    let map = |values: [f64; 3], value_axis| HeatMap {
-        x_name: String::new(),
-        y_name: String::new(),
-        columns: vec![String::new(); 3],
-        rows: vec![String::new()],
-        values: Array2::from_shape_vec((1, 3), values.to_vec()).unwrap(),
-        notes: Array2::default((1, 3)),
-        value_axis,
-        colours: SequentialMap::default(),
-    };
-    let cells = |map: HeatMap| -> Vec<String> {
+    let colours = |values: [f64; 3], axis| -> Vec<String> {
         let fill = |path: Node<'_, '_>| path.attribute("fill").unwrap_or_default().to_owned();
+        let map = heat_map(&[""], &["", "", ""], &values, axis);
         elements(&Figure::from(map).draw(), "path", fill)[..3].to_vec()
     };
-    let even = cells(map([1.0, 2.0, 3.0], PlotAxis::linear("")));
-    let decades = cells(map([0.001, 0.1, 10.0], PlotAxis::logarithmic("")));
+    let even = colours([1.0, 2.0, 3.0], PlotAxis::linear(""));
+    let decades = colours([0.001, 0.1, 10.0], PlotAxis::logarithmic(""));
     assert_eq!(even, decades);
-    assert_ne!(even, cells(map([0.001, 0.1, 10.0], PlotAxis::linear(""))));
+    assert_ne!(even, colours([0.001, 0.1, 10.0], PlotAxis::linear("")));
     // A zero has no logarithm; it is drawn as the minimum.
-    assert_eq!(cells(map([0.0, 1.0, 10.0], PlotAxis::logarithmic("")))[0], decades[0]);
+    assert_eq!(colours([0.0, 1.0, 10.0], PlotAxis::logarithmic(""))[0], decades[0]);
 }
 
 #[test]
@@ -213,15 +205,14 @@ fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
     let mut points = Vec::new();
     for preset in Preset::ALL {
         let mut settings = preset.settings();
-        settings.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
+        let simulation = settings.simulation_mut().unwrap();
+        simulation.sensor.scale = "4x4_2x12".parse().unwrap();
         (
-            settings.simulation_mut().unwrap().samples,
-            settings.simulation_mut().unwrap().validation_samples,
-        ) = (100, 20);
-        (
-            settings.simulation_mut().unwrap().test_samples,
-            settings.training.stopping.epochs,
-        ) = (20, 2);
+            simulation.samples,
+            simulation.validation_samples,
+            simulation.test_samples,
+        ) = (100, 20, 20);
+        settings.training.stopping.epochs = 2;
         let on_point = |_, point: Result<_, _>, _: Option<&_>| {
             points.push(TradeOffPoint {
                 preset: Some(preset),

@@ -239,42 +239,27 @@ fn a_height_has_one_colour_on_every_card_and_zero_error_is_white() {
 }
 
 #[test]
-fn highlighted_nodes_the_section_and_the_chosen_colours_are_printed() {
-    let figure = |change: &dyn Fn(&mut SurfaceFigure)| {
+fn marked_and_highlighted_nodes_the_section_and_the_chosen_colours_are_printed() {
+    let with = |change: &dyn Fn(&mut SurfaceFigure)| {
         let mut figure = figure(vec![from_above(dent("Actual"))]);
         change(&mut figure);
         draw(&figure)
     };
-    let plain = figure(&|_| ());
-    let circles = |picture: &Picture| picture.svg().matches("<circle").count();
-    let lit = figure(&|figure| figure.lit_nodes = vec![1, 5, 999]);
-    assert_eq!(circles(&lit), circles(&plain) + 4, "two rings around each of two nodes");
-    let section = |at_mm| {
-        figure(&|figure| {
-            figure.section = Some(Section {
-                line: SectionLine::RowWire(1),
-                at_mm,
-            });
-        })
-    };
-    assert_ne!(section(1.0).svg(), plain.svg());
-    assert_eq!(section(99.0).svg(), plain.svg(), "next to the surface");
-    let cividis = figure(&|figure| figure.surfaces[0].colours = SequentialMap::Cividis);
+    let plain = with(&|_| ());
+    let rings = |picture: Picture| picture.svg().matches("<circle").count() - plain.svg().matches("<circle").count();
+    let lit = with(&|figure| figure.lit_nodes = vec![1, 5, 999]);
+    assert_eq!(rings(lit), 4, "two rings around each of two nodes");
+    for (node, expected) in [(7, 3), (999, 0)] {
+        let marked = with(&|figure| figure.marked_node = Some(node));
+        assert_eq!(rings(marked), expected, "a disc and two rings");
+    }
+    for (at_mm, is_next_to_the_surface) in [(1.0, false), (99.0, true)] {
+        let line = SectionLine::RowWire(1);
+        let section = with(&|figure| figure.section = Some(Section { line, at_mm }));
+        assert_eq!(section.svg() == plain.svg(), is_next_to_the_surface);
+    }
+    let cividis = with(&|figure| figure.surfaces[0].colours = SequentialMap::Cividis);
     assert_ne!(cividis.svg(), plain.svg());
-}
-
-#[test]
-fn the_marked_node_is_marked_in_print() {
-    let marked = |marked_node| {
-        draw(&SurfaceFigure {
-            marked_node,
-            ..figure(vec![from_above(dent("Actual"))])
-        })
-    };
-    let circles = |picture: &Picture| picture.svg().matches("<circle").count();
-    let [plain, with_mark, no_such_node] = [None, Some(7), Some(999)].map(marked);
-    assert_eq!(circles(&with_mark), circles(&plain) + 3, "a disc and two rings");
-    assert_eq!(circles(&no_such_node), circles(&plain));
 }
 
 #[test]

@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod checkpoint_file;
+mod documents;
 mod network_file;
+mod properties;
 mod run_folder;
-mod sensor_file;
-mod versions;
+mod trained;

@@ -3,29 +3,12 @@
 
 use std::{collections::BTreeMap, fs, path::Path, sync::Arc, thread};
 
-use decoupler_core::{
-    dataset::Simulation,
-    evaluation::{Run, RunSettings},
-};
 use decoupler_files::export::{KeptRun, KeptRuns, NetworkFile, RunFolder};
 
+use crate::trained::network;
+
 fn trained(hidden: usize) -> Arc<NetworkFile> {
-    let mut settings = RunSettings {
-        source: Simulation {
-            samples: 40,
-            validation_samples: 8,
-            test_samples: 8,
-            ..Simulation::default()
-        }
-        .into(),
-        hidden,
-        ..RunSettings::default()
-    };
-    settings.simulation_mut().unwrap().sensor.scale = "4x3_2x9".parse().unwrap();
-    settings.training.stopping.epochs = 4;
-    let mut run = Run::prepare(settings).unwrap();
-    while run.step().is_none() {}
-    Arc::new(NetworkFile::from_run(&run, None).unwrap())
+    Arc::new(network("4x3_2x9", hidden, 4))
 }
 
 /// Opens a folder without damaged files.
@@ -175,6 +158,7 @@ fn a_damaged_run_is_named_and_left_alone() {
         "",
         "not JSON",
         "{\"format\": \"decoupler run list\", \"version\": 1}",
+        "{\"format\": \"decoupler network\", \"version\": 99, \"program\": \"decoupler 7.8\"}",
         &whole.replacen("\"hidden\":3", "\"hidden\":4", 1),
     ];
     for text in texts {

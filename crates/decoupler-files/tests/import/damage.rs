@@ -3,12 +3,13 @@
 use std::{
     fs,
     io::{self, Cursor},
-    ops::ControlFlow,
     path::Path,
 };
 
-use decoupler_files::import::{DialectChoice, Table, read_table};
+use decoupler_files::import::Table;
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
+
+use crate::support;
 
 /// Formats with a checksum.
 const CHECKED: [&str; 7] = [
@@ -27,12 +28,7 @@ fn fixture(name: &str) -> Vec<u8> {
     if name == STORED {
         return stored(&fixture("press.xlsx"));
     }
-    fs::read(
-        Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("tests/fixtures/import")
-            .join(name),
-    )
-    .unwrap()
+    fs::read(support::fixture(name)).unwrap()
 }
 
 /// Returns a zip archive without compression.
@@ -54,8 +50,7 @@ type Content = (Vec<String>, Vec<Vec<u64>>, Vec<String>);
 /// Reads `bytes` as a file of this name; returns everything of the table that is used or shown.
 fn read(bytes: &[u8], path: &Path) -> Result<Content, String> {
     fs::write(path, bytes).unwrap();
-    let read = read_table(path, DialectChoice::default(), &mut |_| ControlFlow::Continue(()));
-    let Table { columns, notes, .. } = read.map_err(|error| error.to_string())?;
+    let Table { columns, notes, .. } = support::read(path)?;
     let bits = |numbers: &[f64]| numbers.iter().map(|number| number.to_bits()).collect();
     let numbers = columns.iter().map(|column| bits(&column.numbers)).collect();
     let names = columns.into_iter().map(|column| column.name).collect();

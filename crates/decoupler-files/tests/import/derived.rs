@@ -1,6 +1,6 @@
 //! Derived columns of a stream of lines, compared with those of a file with the same lines.
 
-use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
+use std::fmt::Write as _;
 
 use decoupler_core::{
     dataset::{Memory, Span},
@@ -9,15 +9,14 @@ use decoupler_core::{
 use decoupler_files::import::{LineParser, ParsedLine, Recipe};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-/// A recipe with every kind of derived column, one of them computed from another, and the inputs that it has.
-fn recipe(derive: &[&str], inputs: &[&str]) -> Recipe {
+use crate::support::{folder, go_on, import, recipe};
+
+/// A recipe with these derived columns as inputs.
+fn deriving(derive: &[&str], inputs: &str) -> Recipe {
     Recipe {
-        data: "data.csv".into(),
         derive: derive.iter().map(|text| text.parse().unwrap()).collect(),
-        inputs: inputs.iter().map(|name| (*name).to_owned()).collect(),
-        targets: vec!["y".to_owned()],
         time: Some("t".to_owned()),
-        ..Recipe::default()
+        ..recipe(inputs, "y")
     }
 }
 
@@ -36,16 +35,6 @@ fn lines(recipe: &Recipe, problem: &Problem) -> LineParser {
     LineParser::of_recording(problem, recipe, None).unwrap()
 }
 
-/// A channel without a unit.
-fn channel(name: &str) -> Channel {
-    Channel::new(name, None)
-}
-
-fn imported(recipe: &Recipe, folder: &Path) -> Problem {
-    let imported = recipe.import(folder, &mut |_| ControlFlow::Continue(()));
-    imported.unwrap().problem
-}
-
 #[test]
 fn a_stream_has_the_derived_columns_of_a_file_bit_for_bit_once_the_start_is_over() {
     let derive = ["d=a-b", "q=a/b", "r=a/start(7)", "p=r-start(0.3s)"];
@@ -61,17 +50,13 @@ fn a_stream_has_the_derived_columns_of_a_file_bit_for_bit_once_the_start_is_over
         (&derive[..], None, 16),
         (&derive[..], Some(memory), 16),
     ] {
-        let folder = tempfile::tempdir().unwrap();
         let text = text(60);
-        let path = folder.path().join("data.csv");
-        fs::write(&path, &text).unwrap();
-        let names = ["d", "q", "r", "p"];
-        let mut recipe = recipe(derive, &names[..derive.len()]);
+        let folder = folder(&[("data.csv", &text)]);
+        let mut recipe = deriving(derive, &format!("{} b", &"d q r p"[..2 * derive.len() - 1]));
         recipe.memory = memory;
-        recipe.inputs.push("b".to_owned());
-        let problem = imported(&recipe, folder.path());
-        let watch = &mut |_| ControlFlow::Continue(());
-        let expected = recipe.read_inputs(&path, &problem, false, watch).unwrap().readings;
+        let problem = import(&recipe, folder.path()).unwrap().problem;
+        let path = folder.path().join("data.csv");
+        let expected = recipe.read_inputs(&path, &problem, false, &mut go_on).unwrap().readings;
         let mut lines = lines(&recipe, &problem);
         let mut found = Vec::new();
         for (number, line) in (1..).zip(text.lines()) {
@@ -94,10 +79,9 @@ fn a_stream_has_the_derived_columns_of_a_file_bit_for_bit_once_the_start_is_over
 
 #[test]
 fn lines_without_a_derived_value_or_a_column_are_refused_with_the_reason() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("data.csv"), text(20)).unwrap();
-    let recipe = recipe(&["q=a/b", "r=a-start(0.1s)"], &["q", "r"]);
-    let problem = imported(&recipe, folder.path());
+    let folder = folder(&[("data.csv", &text(20))]);
+    let recipe = deriving(&["q=a/b", "r=a-start(0.1s)"], "q r");
+    let problem = import(&recipe, folder.path()).unwrap().problem;
     let parsed = |texts: &[&str]| {
         let mut lines = lines(&recipe, &problem);
         let parse = |(number, text): (u64, &&str)| match lines.parse(number, text.as_bytes()) {
@@ -136,10 +120,10 @@ fn lines_without_a_derived_value_or_a_column_are_refused_with_the_reason() {
 
 #[test]
 fn a_stream_waits_for_its_start_only_as_long_as_that_fits_into_memory() {
-    let recipe = recipe(&["r=c1-start(1000000)"], &["r"]);
+    let recipe = deriving(&["r=c1-start(1000000)"], "r");
     let problem = Problem {
-        inputs: vec![channel("r")],
-        targets: vec![channel("y")],
+        inputs: vec![Channel::new("r", None)],
+        targets: vec![Channel::new("y", None)],
         memory: None,
         positions: Vec::new(),
         sensor: None,

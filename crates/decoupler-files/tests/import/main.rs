@@ -4,7 +4,6 @@
 
 mod damage;
 mod derived;
-mod memory;
 mod networks;
 mod positions;
 mod readers;
@@ -12,4 +11,4 @@ mod recordings;
 mod samples;
 mod several_files;
 mod suggestions;
-mod test_files;
+mod support;

@@ -10,22 +10,16 @@ use decoupler_core::{
     dataset::{Division, Simulation, SplitBy},
     evaluation::{Run, RunSettings, TargetErrors, TestErrors},
     job::Job,
+    network::Networks,
     scene::RowModel,
 };
 use decoupler_files::{
     export::{CheckpointFile, NetworkFile, RecipeFile, RunFolder, describe_worse_than_ridge},
-    import::{Plan, Recipe, Setup, SetupError, SetupSets, file_crc32},
+    import::{Plan, Setup, SetupError, SetupSets, file_crc32},
 };
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-fn recipe(inputs: &[&str], target: &str) -> Recipe {
-    Recipe {
-        data: "data.csv".into(),
-        inputs: inputs.iter().map(|&name| name.to_owned()).collect(),
-        targets: vec![target.to_owned()],
-        ..Recipe::default()
-    }
-}
+use crate::support::{folder, go_on, recipe};
 
 /// A recording in `folder` whose target is a curved function of its two readings, and its plan.
 fn curved(folder: &Path) -> Plan {
@@ -37,7 +31,7 @@ fn curved(folder: &Path) -> Plan {
     let text: String = (0..200).map(|_| line()).collect();
     fs::write(folder.join("data.csv"), format!("a,b,force (N)\n{text}")).unwrap();
     Plan {
-        import: recipe(&["a", "b"], "force"),
+        import: recipe("a b", "force"),
         ..Plan::default()
     }
 }
@@ -83,13 +77,29 @@ fn folders(root: &Path) -> [PathBuf; 2] {
     })
 }
 
+/// The network of a training that is resumed and finished.
+fn finished(checkpoint: CheckpointFile) -> Networks {
+    let mut resumed = checkpoint.resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
+    while resumed.step().is_none() {}
+    resumed.network()
+}
+
+/// The reason why a training cannot be resumed.
+fn refusal(checkpoint: CheckpointFile) -> SetupError {
+    checkpoint.resume(&Job::UNINTERRUPTED, &mut |_| ()).err().unwrap()
+}
+
+fn missing(checkpoint: &CheckpointFile) -> Vec<&Path> {
+    checkpoint.recorded.as_ref().unwrap().missing()
+}
+
 fn worse_than_ridge(file: &NetworkFile) -> Option<String> {
     describe_worse_than_ridge(&file.problem, &file.scores)
 }
 
 #[test]
 fn networks_of_recordings_are_saved_with_the_names_of_their_channels() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(&[]);
     let file = trained(folder.path());
     let [network, ridge] = [&file.scores.network, &file.scores.baselines.linear].map(|errors| errors.targets()[0]);
     assert!(network.rmse < 0.2 * ridge.rmse, "{network:?} {ridge:?}");
@@ -118,7 +128,7 @@ fn networks_of_recordings_are_saved_with_the_names_of_their_channels() {
 
 #[test]
 fn the_remark_on_a_network_worse_than_ridge_claims_no_cause() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(&[]);
     let mut file = trained(folder.path());
     let ridge = file.scores.baselines.linear.targets()[0];
     let with_rmse = |rmse: f64| TestErrors::Targets(vec![TargetErrors { rmse, ..ridge }]);
@@ -155,94 +165,68 @@ fn the_remark_on_a_network_worse_than_ridge_claims_no_cause() {
 
 #[test]
 fn a_checkpoint_of_a_recording_resumes_bit_for_bit_or_reports_a_changed_recording() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(&[]);
     let (checkpoint, whole) = paused(folder.path());
     let path = folder.path().join("run.checkpoint");
     checkpoint.save(&path).unwrap();
     let read = CheckpointFile::load(&path).unwrap();
     assert_eq!(read, checkpoint);
-    let mut resumed = read.clone().resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
-    while resumed.step().is_none() {}
-    assert_eq!(resumed.network(), whole.network);
+    assert_eq!(finished(read), whole.network);
     // A changed digit of a sample.
     let data = folder.path().join("data.csv");
     fs::write(&data, fs::read_to_string(&data).unwrap().replacen("0.", "0.0", 1)).unwrap();
-    let error = whole.test_set().err().unwrap();
-    assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
-    let error = read.resume(&Job::UNINTERRUPTED, &mut |_| ()).err().unwrap();
-    assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
-    assert!(error.to_string().contains("data.csv' has other samples"), "{error}");
+    for error in [whole.test_set().err().unwrap(), refusal(checkpoint)] {
+        assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
+        assert!(error.to_string().contains("data.csv' has other samples"), "{error}");
+    }
 }
 
 #[test]
-fn files_can_be_moved_together_with_their_recording() {
-    let root = tempfile::tempdir().unwrap();
-    let [recordings, networks] = folders(&root.path().join("here"));
+fn files_are_found_when_they_move_together_with_their_recording_or_when_it_is_given_again() {
+    let root = folder(&[]);
+    let at = |name: &str| root.path().join(name);
+    let [recordings, networks] = folders(&at("here"));
     let (checkpoint, whole) = paused(&recordings);
     checkpoint.save(&networks.join("run.checkpoint")).unwrap();
     whole.save(&networks.join("network.json")).unwrap();
     let check = |folder: &Path| {
         let file = NetworkFile::load(&folder.join("network.json")).unwrap();
-        assert_eq!(
-            file.recorded.as_ref().unwrap().missing(),
-            Vec::<&Path>::new(),
-            "{folder:?}"
-        );
+        assert!(file.recorded.as_ref().unwrap().missing().is_empty(), "{folder:?}");
         assert_eq!(file.network, whole.network);
-        let mut resumed = CheckpointFile::load(&folder.join("run.checkpoint"))
-            .unwrap()
-            .resume(&Job::UNINTERRUPTED, &mut |_| ())
-            .unwrap()
-            .0;
-        while resumed.step().is_none() {}
-        assert_eq!(resumed.network(), whole.network, "{folder:?}");
+        let checkpoint = CheckpointFile::load(&folder.join("run.checkpoint")).unwrap();
+        assert_eq!(finished(checkpoint), whole.network, "{folder:?}");
     };
     check(&networks);
     // Both folders, to another place.
-    fs::rename(root.path().join("here"), root.path().join("there")).unwrap();
-    let [recordings, networks] = folders(&root.path().join("there"));
-    check(&networks);
+    fs::rename(at("here"), at("there")).unwrap();
+    check(&at("there/networks"));
     // All files into one folder, as in a message to a colleague.
-    let sent = root.path().join("sent");
-    fs::create_dir(&sent).unwrap();
+    fs::create_dir(at("sent")).unwrap();
     for file in [
-        networks.join("run.checkpoint"),
-        networks.join("network.json"),
-        recordings.join("data.csv"),
+        "networks/run.checkpoint",
+        "networks/network.json",
+        "recordings/data.csv",
     ] {
-        fs::rename(&file, sent.join(file.file_name().unwrap())).unwrap();
+        let file = at("there").join(file);
+        fs::rename(&file, at("sent").join(file.file_name().unwrap())).unwrap();
     }
-    check(&sent);
-}
-
-#[test]
-fn a_recording_that_is_missing_is_named_and_can_be_given_again() {
-    let root = tempfile::tempdir().unwrap();
-    let [recordings, networks] = folders(root.path());
-    let (checkpoint, whole) = paused(&recordings);
-    let path = networks.join("run.checkpoint");
-    checkpoint.save(&path).unwrap();
-    let (data, renamed) = (recordings.join("data.csv"), recordings.join("press.csv"));
-    fs::rename(&data, &renamed).unwrap();
-    let mut read = CheckpointFile::load(&path).unwrap();
-    assert_eq!(read.recorded.as_ref().unwrap().missing(), [data.as_path()]);
-    let error = read
-        .clone()
-        .resume(&Job::UNINTERRUPTED, &mut |_| ())
-        .err()
-        .unwrap()
-        .to_string();
+    check(&at("sent"));
+    // The recording under another name.
+    let renamed = at("sent/press.csv");
+    fs::rename(at("sent/data.csv"), &renamed).unwrap();
+    let mut read = CheckpointFile::load(&at("sent/run.checkpoint")).unwrap();
+    let data = at("recordings/data.csv");
+    assert_eq!(missing(&read), [data.as_path()], "as it was saved");
+    let error = refusal(read.clone()).to_string();
     assert!(error.contains("cannot read") && error.contains("data.csv"), "{error}");
     read.recorded = read.recorded.map(|recorded| recorded.relocated(&data, &renamed));
-    assert_eq!(read.recorded.as_ref().unwrap().missing(), Vec::<&Path>::new());
-    let mut resumed = read.resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
-    while resumed.step().is_none() {}
-    assert_eq!(resumed.network(), whole.network);
+    assert!(missing(&read).is_empty());
+    assert_eq!(finished(read), whole.network);
 }
 
 #[test]
 fn no_saved_file_has_an_absolute_path() {
-    let root = tempfile::tempdir().unwrap();
+    let root = folder(&[]);
     let [recordings, networks] = folders(root.path());
     let (checkpoint, whole) = paused(&recordings);
     checkpoint.save(&networks.join("run.checkpoint")).unwrap();
@@ -254,6 +238,7 @@ fn no_saved_file_has_an_absolute_path() {
         .unwrap();
     let (mut kept, _) = RunFolder::open(&networks.join("runs")).unwrap();
     kept.keep(Arc::new(whole.clone())).unwrap();
+    assert_eq!(kept.runs().runs[0].name, "data h5 br");
     let entries = [networks.clone(), networks.join("runs")].map(|folder| fs::read_dir(folder).unwrap());
     let mut files = 0;
     for entry in entries.into_iter().flatten() {
@@ -273,44 +258,8 @@ fn no_saved_file_has_an_absolute_path() {
 }
 
 #[test]
-fn a_run_folder_keeps_runs_of_both_sources() {
-    let root = tempfile::tempdir().unwrap();
-    let [recordings, runs] = folders(root.path());
-    let mut settings = RunSettings::default();
-    settings.simulation_mut().unwrap().sensor.scale = "2x2_2x6".parse().unwrap();
-    (
-        settings.simulation_mut().unwrap().samples,
-        settings.simulation_mut().unwrap().test_samples,
-    ) = (20, 8);
-    settings.training.stopping.epochs = 2;
-    let mut simulated = Run::prepare(settings).unwrap();
-    while simulated.step().is_none() {}
-    let files = [NetworkFile::from_run(&simulated, None).unwrap(), trained(&recordings)].map(Arc::new);
-    let (mut kept, _) = RunFolder::open(&runs).unwrap();
-    for file in &files {
-        kept.keep(Arc::clone(file)).unwrap();
-    }
-    let names = |folder: &RunFolder| Vec::from_iter(folder.runs().runs.iter().map(|run| run.name.clone()));
-    assert_eq!(names(&kept), ["2×2_2×6 h12 lm", "data h5 br"]);
-    let (mut other, problems) = RunFolder::open(&runs).unwrap();
-    assert!(problems.is_empty() && other.load_used().is_empty() && kept.load_used().is_empty());
-    assert_eq!(other.runs(), kept.runs());
-    let [first, second] = [0, 1].map(|place| kept.runs().runs[place].id);
-    other.rename(second, "press").unwrap();
-    other.pin([Some(second), Some(first)]).unwrap();
-    kept.remove(first).unwrap();
-    for folder in [&mut kept, &mut other] {
-        assert!(folder.look().is_empty() && folder.load_used().is_empty());
-    }
-    assert_eq!(kept.runs(), other.runs());
-    assert_eq!(names(&kept), ["press"]);
-    assert_eq!(kept.runs().pinned, [Some(second), None]);
-    assert_eq!(*kept.runs().runs[0].load(&runs).unwrap(), *files[1]);
-}
-
-#[test]
 fn only_the_runs_in_use_are_in_memory() {
-    let root = tempfile::tempdir().unwrap();
+    let root = folder(&[]);
     let [recordings, runs] = folders(root.path());
     let (mut kept, _) = RunFolder::open(&runs).unwrap();
     let file = Arc::new(trained(&recordings));
@@ -359,10 +308,10 @@ fn only_the_runs_in_use_are_in_memory() {
 
 #[test]
 fn a_recipe_repeats_the_import_from_another_folder() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(&[]);
     fs::write(folder.path().join("data.csv"), "t,x,y\n0,1,2\n1,3,4\n2,5,6\n3,7,8\n").unwrap();
     let mut plan = Plan {
-        import: recipe(&["x"], "y"),
+        import: recipe("x", "y"),
         division: Division {
             by: SplitBy::Random,
             ..Division::default()
@@ -381,9 +330,7 @@ fn a_recipe_repeats_the_import_from_another_folder() {
     let read = RecipeFile::load_recording(&path).unwrap();
     assert_eq!(read, plan.within(folder.path()));
     assert_eq!(RecipeFile::load(&path).unwrap(), RecipeFile::Recording(read.clone()));
-    let recording = read
-        .recording(Path::new(""), &mut |_| std::ops::ControlFlow::Continue(()))
-        .unwrap();
+    let recording = read.recording(Path::new(""), &mut go_on).unwrap();
     assert_eq!(recording.set.readings().column(0).to_vec(), [3.0, 5.0, 7.0]);
     for (from, to, cause) in [
         ("\"inputs\"", "\"imputs\"", "unknown field `imputs`"),
@@ -407,7 +354,7 @@ fn a_recipe_repeats_the_import_from_another_folder() {
 
 #[test]
 fn a_recipe_of_an_array_has_only_differences_from_the_papers_array() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(&[]);
     let path = folder.path().join("array.json");
     let written = |source: &str| {
         let text =
@@ -469,7 +416,7 @@ fn pipe(path: &Path) {
 #[cfg(unix)]
 #[test]
 fn a_pipe_named_by_a_file_is_refused_before_it_is_opened() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(&[]);
     let plan = curved(folder.path()).within(folder.path());
     let recipe = folder.path().join("recipe.json");
     RecipeFile::Recording(plan.clone()).save(&recipe).unwrap();
@@ -481,8 +428,6 @@ fn a_pipe_named_by_a_file_is_refused_before_it_is_opened() {
     assert!(error.contains("data.csv' is a pipe or device"), "{error}");
     let error = file.test_set().unwrap_err().to_string();
     assert!(error.contains("data.csv' is a pipe or device"), "{error}");
-    let error = file_crc32(&data, &mut |_| std::ops::ControlFlow::Continue(()))
-        .unwrap_err()
-        .to_string();
+    let error = file_crc32(&data, &mut go_on).unwrap_err().to_string();
     assert!(error.contains("data.csv' is a pipe or device"), "{error}");
 }

@@ -1,6 +1,6 @@
 //! Positions of targets on the skin: reading their file, matching them to the targets, and errors with line and cause.
 
-use std::{fs, ops::ControlFlow, path::Path};
+use std::{fs, path::Path};
 
 use decoupler_core::problem::TargetPosition;
 use decoupler_files::{
@@ -9,31 +9,26 @@ use decoupler_files::{
 };
 use tempfile::TempDir;
 
+use crate::support::{folder, go_on, recipe};
+
 /// A recording of one reading and four deformations, a force and a temperature.
 fn recording() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let mut text = "u (V),d1 (mm),d2 (mm),d3 (mm),d4 (mm),force (N),spare\n".to_owned();
-    for row in 0..12 {
-        text += &format!("{row},{},{},{},{},{},0\n", row + 1, row + 2, row * 2, row % 5, row % 3);
-    }
-    fs::write(folder.path().join("skin.csv"), text).unwrap();
-    folder
+    let row = |row| format!("{row},{},{},{},{},{},0\n", row + 1, row + 2, row * 2, row % 5, row % 3);
+    let rows: String = (0..12).map(row).collect();
+    let text = format!("u (V),d1 (mm),d2 (mm),d3 (mm),d4 (mm),force (N),spare\n{rows}");
+    folder(&[("data.csv", &text)])
 }
 
 fn imported(folder: &TempDir, positions: &str) -> Result<Recording, ImportError> {
     fs::write(folder.path().join("taxels.csv"), positions).unwrap();
-    plan().import.import(folder.path(), &mut |_| ControlFlow::Continue(()))
+    plan().import.import(folder.path(), &mut go_on)
 }
 
 fn plan() -> Plan {
-    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     Plan {
         import: Recipe {
-            data: "skin.csv".into(),
-            inputs: names(&["u"]),
-            targets: names(&["d1..force"]),
             positions: Some("taxels.csv".into()),
-            ..Recipe::default()
+            ..recipe("u", "d1..force")
         },
         ..Plan::default()
     }
@@ -108,10 +103,7 @@ fn invalid_files_are_refused_with_line_and_cause() {
     let error = imported(&folder, "target,x,y\nd1,0,0\nd7,1,0\n").unwrap_err();
     assert!(matches!(error, ImportError::File { .. }), "{error:?}");
     fs::remove_file(folder.path().join("taxels.csv")).unwrap();
-    let gone = plan()
-        .import
-        .import(folder.path(), &mut |_| ControlFlow::Continue(()))
-        .unwrap_err();
+    let gone = plan().import.import(folder.path(), &mut go_on).unwrap_err();
     assert!(gone.to_string().starts_with("cannot read '"), "{gone}");
 }
 
@@ -129,13 +121,11 @@ fn a_recipe_keeps_the_file_relative_to_its_folder() {
             .contains("\"positions\": \"taxels.csv\"")
     );
     let moved = tempfile::tempdir().unwrap();
-    for name in ["skin.csv", "taxels.csv", "recipe.json"] {
+    for name in ["data.csv", "taxels.csv", "recipe.json"] {
         fs::rename(folder.path().join(name), moved.path().join(name)).unwrap();
     }
     let loaded = RecipeFile::load_recording(&moved.path().join("recipe.json")).unwrap();
-    let again = loaded
-        .recording(Path::new(""), &mut |_| ControlFlow::Continue(()))
-        .unwrap();
+    let again = loaded.recording(Path::new(""), &mut go_on).unwrap();
     assert_eq!(again.problem.positions.len(), 2);
 }
 
@@ -150,6 +140,6 @@ fn files_of_positions_are_distinguished_from_recordings() {
     assert!(holds("a.csv", "target,x,y\nd1,0,0\n") && holds("b.csv", "target;x (mm);y (mm)\nd1;0;0\n"));
     assert!(!holds("c.csv", "target,x,y,z\nd1,0,0,0\n") && !holds("d.csv", "time,x,y\n0,0,0\n"));
     assert!(
-        !holds("e.csv", "") && !holds_positions(&folder.path().join("skin.csv")) && !holds_positions(folder.path())
+        !holds("e.csv", "") && !holds_positions(&folder.path().join("data.csv")) && !holds_positions(folder.path())
     );
 }

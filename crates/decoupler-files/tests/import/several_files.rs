@@ -1,14 +1,16 @@
 //! Several files of one experiment: their rows follow one another, and each file is a group.
 
-use std::{fs, ops::ControlFlow, path::Path};
+use std::{fs, path::Path};
 
 use decoupler_core::dataset::{Memory, Seed, Span, SplitBy};
-use decoupler_files::import::{FileSet, ImportError, Joined, Plan, Recipe, Recording};
+use decoupler_files::import::{FileSet, Plan, Recipe};
 use tempfile::TempDir;
+
+use crate::support::{folder, go_on, import, joined, reading, recipe, refused, target};
 
 /// A folder with a sensor file (t, r) and a states file (t, f) per session; the force of session s in row i is 10 s + i.
 fn sessions(count: usize) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(&[]);
     for session in 0..count {
         let (mut sensor, mut states) = ("t,r,subject\n".to_owned(), "t,f\n".to_owned());
         for row in 0..5 {
@@ -23,123 +25,92 @@ fn sessions(count: usize) -> TempDir {
     folder
 }
 
-fn set(session: usize) -> FileSet {
-    FileSet {
+fn of_sessions(count: usize) -> Recipe {
+    let appended = |session: usize| FileSet {
         data: format!("{session}/sensor.csv").into(),
         join: vec![format!("{session}/states.csv").into()],
         append: Vec::new(),
-    }
-}
-
-fn recipe(count: usize) -> Recipe {
+    };
     Recipe {
         data: "0/sensor.csv".into(),
-        join: vec![Joined {
-            file: "0/states.csv".into(),
-            ..Joined::default()
-        }],
-        append: (1..count).map(set).collect(),
-        inputs: vec!["r".to_owned()],
-        targets: vec!["states.f".to_owned()],
+        join: vec![joined("0/states.csv")],
+        append: (1..count).map(appended).collect(),
         time: Some("t".to_owned()),
-        ..Recipe::default()
+        ..recipe("r", "states.f")
     }
-}
-
-fn import(recipe: &Recipe, folder: &TempDir) -> Result<Recording, ImportError> {
-    recipe.import(folder.path(), &mut |_| ControlFlow::Continue(()))
 }
 
 #[test]
 fn rows_of_all_files_follow_one_another_and_each_file_is_a_group() {
     let folder = sessions(3);
-    let recording = import(&recipe(3), &folder).unwrap();
+    let recording = import(&of_sessions(3), folder.path()).unwrap();
     let forces = Vec::from_iter((0..3).flat_map(|session| (0..5).map(move |row| f64::from(10 * session + row))));
-    assert_eq!(recording.set.targets().column(0).to_vec(), forces);
+    assert_eq!(target(&recording, 0), forces);
     assert_eq!(
-        recording.set.readings().column(0).to_vec(),
+        reading(&recording, 0),
         Vec::from_iter(forces.iter().map(|force| 2.0 * force))
     );
-    let groups = Vec::from_iter((0..3).flat_map(|session| [session; 5]));
-    assert_eq!(recording.set.groups(), groups);
+    assert_eq!(recording.set.groups(), [[0; 5], [1; 5], [2; 5]].concat());
     assert_eq!((recording.rows, recording.files.len()), (15, 6));
     assert_eq!((recording.lines[0], recording.lines[7]), (2, 4));
-    assert_eq!(recording.file_of(4), folder.path().join("0/sensor.csv"));
-    assert_eq!(recording.file_of(5), folder.path().join("1/sensor.csv"));
+    for (sample, file) in [(4, "0/sensor.csv"), (5, "1/sensor.csv")] {
+        assert_eq!(recording.file_of(sample), folder.path().join(file));
+    }
     assert_eq!(recording.times.as_ref().map(Vec::len), Some(15));
     // A session is tested on as a whole.
     let mut plan = Plan {
-        import: recipe(3),
+        import: of_sessions(3),
         ..Plan::default()
     };
     plan.division.by = SplitBy::Group;
     plan.division.validation_fraction = Some(0.0);
-    let (recording, _) = plan
-        .recordings(folder.path(), &mut |_| ControlFlow::Continue(()))
-        .unwrap();
+    let (recording, _) = plan.recordings(folder.path(), &mut go_on).unwrap();
     let (split, test) = plan.divide(&recording, None, Seed(0)).unwrap();
     assert_eq!((test.samples(), split.training.samples()), (5, 10));
-}
-
-#[test]
-fn equal_values_of_a_group_column_are_one_group_in_all_files() {
-    let folder = sessions(3);
+    // Equal values of a column of groups are one group in all files.
     let by_subject = Recipe {
         group: Some("subject".to_owned()),
-        ..recipe(3)
+        ..of_sessions(3)
     };
-    let recording = import(&by_subject, &folder).unwrap();
+    let recording = import(&by_subject, folder.path()).unwrap();
     assert_eq!(recording.set.groups(), [[0; 5], [1; 5], [0; 5]].concat());
 }
 
 #[test]
 fn the_past_does_not_reach_into_the_file_before() {
-    let folder = sessions(2);
-    let with_lag = Recipe {
-        memory: Some(Memory {
-            lags: vec![Span::Samples(1.0)],
-            ..Memory::default()
-        }),
-        ..recipe(2)
-    };
-    let recording = import(&with_lag, &folder).unwrap();
-    let lagged = recording.set.readings().column(1).to_vec();
-    assert_eq!(lagged, [0.0, 0.0, 2.0, 4.0, 6.0, 20.0, 20.0, 22.0, 24.0, 26.0]);
+    let mut with_lag = of_sessions(2);
+    with_lag.memory = Some(Memory {
+        lags: vec![Span::Samples(1.0)],
+        ..Memory::default()
+    });
+    let recording = import(&with_lag, sessions(2).path()).unwrap();
+    assert_eq!(
+        reading(&recording, 1),
+        [0.0, 0.0, 2.0, 4.0, 6.0, 20.0, 20.0, 22.0, 24.0, 26.0]
+    );
 }
 
 #[test]
 fn a_file_with_other_columns_is_refused_by_name() {
     let folder = sessions(2);
-    let error_with = |text: &str| {
+    for (text, cause) in [
+        ("t,resistance\n0,1\n0.1,2\n", "1/sensor.csv': there is no column 'r'"),
+        ("t,r (ohm)\n0,1\n0.1,2\n", "need the same columns"),
+        ("t,r\n0,1\n0.1,bad\n", "1/sensor.csv': line 3"),
+        ("t,r\n50,1\n51,2\n", "1/sensor.csv': no row of 2 is left"),
+    ] {
         fs::write(folder.path().join("1/sensor.csv"), text).unwrap();
-        import(&recipe(2), &folder).unwrap_err().to_string()
-    };
-    let error = error_with("t,resistance\n0,1\n0.1,2\n");
-    assert!(error.contains("1/sensor.csv': there is no column 'r'"), "{error}");
-    let error = error_with("t,r (ohm)\n0,1\n0.1,2\n");
-    assert!(
-        error.contains("r (ohm)") && error.contains("need the same columns"),
-        "{error}"
-    );
-    let error = error_with("t,r\n0,1\n0.1,bad\n");
-    assert!(error.contains("1/sensor.csv': line 3"), "{error}");
-    let error = error_with("t,r\n50,1\n51,2\n");
-    assert!(error.contains("1/sensor.csv': no row of 2 is left"), "{error}");
-    let without_joined = Recipe {
-        append: vec![FileSet {
-            data: "1/sensor.csv".into(),
-            ..FileSet::default()
-        }],
-        ..recipe(1)
-    };
-    let error = import(&without_joined, &folder).unwrap_err().to_string();
-    assert!(error.contains("needs 1 joined file and has 0"), "{error}");
+        refused(&of_sessions(2), folder.path(), cause);
+    }
+    let mut without_joined = of_sessions(2);
+    without_joined.append[0].join.clear();
+    refused(&without_joined, folder.path(), "needs 1 joined file and has 0");
 }
 
 #[test]
 fn plans_keep_their_files_and_old_plans_are_read() {
     let plan = Plan {
-        import: recipe(2),
+        import: of_sessions(2),
         ..Plan::default()
     };
     let text = serde_json::to_string(&plan).unwrap();

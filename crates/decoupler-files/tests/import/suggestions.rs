@@ -1,32 +1,21 @@
 //! Guesses of the meanings of files and columns.
 
-use std::{fs, ops::ControlFlow, path::Path};
+use std::path::Path;
 
 use decoupler_core::dataset::SplitBy;
-use decoupler_files::import::{Joined, Meaning, Missing, Plan, Recipe, suggested_plan};
+use decoupler_files::import::{Meaning, Plan, Recipe, suggested_plan};
+
+use crate::support::{folder, go_on, joined, recipe};
 
 /// Returns the guess for files with these names and contents.
 fn guessed(files: &[(&str, &str)]) -> Plan {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, text) in files {
-        fs::write(folder.path().join(name), text).unwrap();
-    }
+    let folder = folder(files);
     let recipe = Recipe {
         data: files[0].0.into(),
-        join: files[1..]
-            .iter()
-            .map(|(name, _)| Joined {
-                file: name.into(),
-                ..Joined::default()
-            })
-            .collect(),
+        join: files[1..].iter().map(|(name, _)| joined(name)).collect(),
         ..Recipe::default()
     };
-    suggested_plan(
-        &recipe
-            .inspect(folder.path(), &[], &mut |_| ControlFlow::Continue(()))
-            .unwrap(),
-    )
+    suggested_plan(&recipe.inspect(folder.path(), &[], &mut go_on).unwrap())
 }
 
 /// Returns rows of these columns, each a function of the row.
@@ -172,25 +161,18 @@ fn files_without_a_common_time_are_joined_row_by_row_and_test_files_found() {
 
 #[test]
 fn a_recipe_is_inspected_with_its_own_meanings_and_missing_cells() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("a.csv"), "t,u,v,g\n1,5,-1,p\n2,6,7,p\n3,7,8,q\n").unwrap();
-    fs::write(folder.path().join("b.csv"), "t,f\n1,-1\n2,3\n3,4\n").unwrap();
+    let folder = folder(&[
+        ("data.csv", "t,u,v,g\n1,5,-1,p\n2,6,7,p\n3,7,8,q\n"),
+        ("b.csv", "t,f\n1,-1\n2,3\n3,4\n"),
+    ]);
     let recipe = Recipe {
-        data: "a.csv".into(),
-        join: vec![Joined {
-            file: "b.csv".into(),
-            ..Joined::default()
-        }],
-        inputs: vec!["u..v".to_owned()],
-        targets: vec!["b.f".to_owned()],
+        join: vec![joined("b.csv")],
         time: Some("t".to_owned()),
         group: Some("g".to_owned()),
-        missing: vec!["v=-1".parse::<Missing>().unwrap()],
-        ..Recipe::default()
+        missing: vec!["v=-1".parse().unwrap()],
+        ..recipe("u..v", "b.f")
     };
-    let files = recipe
-        .inspect(folder.path(), &[], &mut |_| ControlFlow::Continue(()))
-        .unwrap();
+    let files = recipe.inspect(folder.path(), &[], &mut go_on).unwrap();
     assert_eq!(
         files[0].meanings,
         [Meaning::Time, Meaning::Input, Meaning::Input, Meaning::Group]
@@ -207,11 +189,8 @@ fn a_recipe_is_inspected_with_its_own_meanings_and_missing_cells() {
         targets: vec!["b.force".to_owned()],
         ..recipe
     };
-    let error = wrong
-        .inspect(folder.path(), &[], &mut |_| ControlFlow::Continue(()))
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("b.force"), "{error}");
+    let error = wrong.inspect(folder.path(), &[], &mut go_on).unwrap_err();
+    assert!(error.to_string().contains("b.force"), "{error}");
 }
 
 #[test]

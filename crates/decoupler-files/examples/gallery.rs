@@ -1,4 +1,5 @@
-//! Pictures to look at: `cargo test -p decoupler-files --test figures gallery -- --ignored`, then open `target/pictures`.
+//! Pictures of every printed figure, to look at: `cargo run --release --example gallery`, then open `target/pictures`.
+#![expect(clippy::unwrap_used, reason = "it ends by panicking")]
 
 use std::{fs, path::Path, sync::Arc};
 
@@ -29,10 +30,12 @@ use decoupler_files::{
 use glam::DVec3;
 use ndarray::Array2;
 
+const PICTURES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/pictures");
+
 fn draw(name: &str, figure: impl Into<Figure>) {
     let picture = figure.into().draw();
     for extension in ["svg", "png"] {
-        let path = format!("../../target/pictures/print-{name}.{extension}");
+        let path = format!("{PICTURES}/print-{name}.{extension}");
         picture.save(Path::new(&path)).unwrap();
     }
 }
@@ -50,10 +53,8 @@ fn small(preset: Preset) -> RunSettings {
     settings
 }
 
-#[test]
-#[ignore = "writes pictures"]
-fn gallery_of_printed_figures() {
-    fs::create_dir_all("../../target/pictures").unwrap();
+fn main() {
+    fs::create_dir_all(PICTURES).unwrap();
     let mut run = Run::prepare(small(Preset::Paper)).unwrap();
     while run.step().is_none() {}
     let (history, stages) = (run.leader().history(), run.leader().stages());
@@ -75,9 +76,7 @@ fn gallery_of_printed_figures() {
         decoders: &[],
         test: run.test(),
     };
-    report
-        .save(Path::new("../../target/pictures/print-report.html"))
-        .unwrap();
+    report.save(&Path::new(PICTURES).join("print-report.html")).unwrap();
 
     let xy = |node: usize| (8.0 + (node / 6) as f64, 3.0 + 2.0 * (node % 6) as f64);
     let dent = |node: usize| 5.0 - 0.9 * (-0.1 * ((xy(node).0 - 12.0).powi(2) + (xy(node).1 - 8.0).powi(2))).exp();

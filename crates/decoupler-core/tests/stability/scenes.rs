@@ -14,8 +14,6 @@ use crate::{
     situations,
 };
 
-const ROOM: &str = "scene";
-
 /// Largest of all resistances at rest.
 fn largest_ohm(model: &SensorModel) -> f64 {
     let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
@@ -170,13 +168,8 @@ fn judge_seeds(settings: &RunSettings) -> Verdict {
 }
 
 pub(crate) fn jobs() -> Vec<Job> {
-    let mut jobs = Vec::new();
-    for (extreme, sentence, settings) in situations::all() {
-        jobs.push(Job::new(ROOM, extreme, sentence, move || judge(&settings)));
-    }
-    for (extreme, sentence, settings) in situations::all().into_iter().step_by(5) {
-        let sentence = format!("{sentence}, drawn twice");
-        jobs.push(Job::one(ROOM, extreme, sentence, move || judge_seeds(&settings)));
-    }
-    jobs
+    let job = |(sentence, settings)| Job::new(sentence, move || judge(&settings));
+    let twice = |(sentence, settings)| Job::one(format!("{sentence}, drawn twice"), move || judge_seeds(&settings));
+    let twice = situations::all().into_iter().step_by(5).map(twice);
+    situations::all().into_iter().map(job).chain(twice).collect()
 }

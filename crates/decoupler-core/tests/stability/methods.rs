@@ -9,8 +9,6 @@ use ndarray::{Array2, Axis, Slice};
 
 use crate::judge::{Job, Verdict, agree, flagged, refused, wrong};
 
-const ROOM: &str = "method";
-
 /// A training problem and the weights it starts from.
 #[derive(Clone)]
 struct Task {
@@ -171,7 +169,7 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
 }
 
 /// Tasks of every extreme, with a sentence each.
-fn tasks() -> Vec<(&'static str, String, Task)> {
+fn tasks() -> Vec<(String, Task)> {
     let ordinary = Task::of(60, 3, 5, 2);
     let scaled = |inputs: f64, targets: f64, start: f64| Task {
         inputs: inputs * &ordinary.inputs,
@@ -179,19 +177,23 @@ fn tasks() -> Vec<(&'static str, String, Task)> {
         start,
         ..ordinary.clone()
     };
-    let repeated = |mut task: Task| {
-        let (inputs, targets) = (task.inputs.row(0).to_owned(), task.targets.row(0).to_owned());
-        task.inputs
-            .rows_mut()
-            .into_iter()
-            .for_each(|mut row| row.assign(&inputs));
-        task.targets
-            .rows_mut()
-            .into_iter()
-            .for_each(|mut row| row.assign(&targets));
-        task
+    let repeat = |values: &Array2<f64>| values.select(Axis(0), &vec![0; values.nrows()]);
+    let repeated = Task {
+        inputs: repeat(&ordinary.inputs),
+        targets: repeat(&ordinary.targets),
+        ..ordinary.clone()
     };
-    let mut tasks = vec![("sizes", "an ordinary task".to_owned(), ordinary.clone())];
+    let unheld = Task {
+        has_validation: false,
+        ..ordinary.clone()
+    };
+    let mut tasks = vec![
+        ("an ordinary task".to_owned(), ordinary.clone()),
+        ("all samples the same".to_owned(), repeated),
+        ("inputs constant".to_owned(), scaled(0.0, 1.0, 1.0)),
+        ("targets constant".to_owned(), scaled(1.0, 0.0, 1.0)),
+        ("nothing held out".to_owned(), unheld),
+    ];
     for (samples, inputs, hidden, outputs) in [
         (1, 3, 5, 2),
         (2, 3, 5, 2),
@@ -203,30 +205,19 @@ fn tasks() -> Vec<(&'static str, String, Task)> {
         (30, 200, 3, 2),
         (30, 3, 3, 200),
         (400, 2, 2, 1),
+        (60, 0, 2, 2),
         (5, 3, 0, 2),
         (5, 3, 2, 0),
     ] {
         let sentence = format!("{samples} samples of {inputs} inputs, {hidden} hidden nodes, {outputs} outputs");
-        tasks.push(("sizes", sentence, Task::of(samples, inputs, hidden, outputs)));
+        tasks.push((sentence, Task::of(samples, inputs, hidden, outputs)));
     }
-    tasks.push(("samples", "all samples the same".into(), repeated(ordinary.clone())));
-    tasks.push(("samples", "inputs constant".into(), scaled(0.0, 1.0, 1.0)));
-    tasks.push(("samples", "targets constant".into(), scaled(1.0, 0.0, 1.0)));
-    let unheld = Task {
-        has_validation: false,
-        ..ordinary.clone()
-    };
-    tasks.push(("samples", "nothing held out".into(), unheld));
     for factor in [1e-300, 1e-150, 1e-30, 1e-6, 1e6, 1e30, 1e150, 1e300] {
-        tasks.push(("samples", format!("inputs times {factor:e}"), scaled(factor, 1.0, 1.0)));
-        tasks.push(("samples", format!("targets times {factor:e}"), scaled(1.0, factor, 1.0)));
+        tasks.push((format!("inputs times {factor:e}"), scaled(factor, 1.0, 1.0)));
+        tasks.push((format!("targets times {factor:e}"), scaled(1.0, factor, 1.0)));
     }
     for start in [0.0, 1e-300, 1e-9, 30.0, 1e3, 1e9, 1e150, 1e300] {
-        tasks.push((
-            "saturated and vanishing units",
-            format!("weights times {start:e}"),
-            scaled(1.0, 1.0, start),
-        ));
+        tasks.push((format!("weights times {start:e}"), scaled(1.0, 1.0, start)));
     }
     tasks
 }
@@ -237,23 +228,18 @@ pub(crate) fn jobs() -> Vec<Job> {
         epochs: 40,
         ..StoppingRules::default()
     };
+    let mut push = |method: Method, stopping, sentence: String, task: Task| {
+        let sentence = format!("{}, {sentence}", method.short_name());
+        let settings = TrainingSettings { method, stopping };
+        jobs.push(Job::one(sentence, move || judge(&task, settings)));
+    };
     for method in Method::all() {
-        let name = method.short_name();
-        for (extreme, sentence, task) in tasks() {
-            let settings = TrainingSettings {
-                method,
-                stopping: usual,
-            };
-            jobs.push(Job::one(ROOM, extreme, format!("{name}, {sentence}"), move || {
-                judge(&task, settings)
-            }));
+        for (sentence, task) in tasks() {
+            push(method, usual, sentence, task);
         }
         for row in method.settings() {
             let mut asked = method;
-            let (setting, default) = (
-                row.name,
-                row.number(&method).expect("the settings of methods are numbers"),
-            );
+            let default = row.number(&method).expect("the settings of methods are numbers");
             let (least, most) = row.range().expect("the settings of methods are numbers").into_inner();
             for value in [
                 least,
@@ -277,53 +263,30 @@ pub(crate) fn jobs() -> Vec<Job> {
                         has_validation,
                         ..Task::of(60, 3, 5, 2)
                     };
-                    let settings = TrainingSettings {
-                        method: asked,
-                        stopping: usual,
-                    };
-                    let held = if has_validation { "" } else { ", nothing held out" };
-                    let sentence = format!("{name}, {setting} {value:e}{held}");
-                    jobs.push(Job::one(ROOM, "wild settings", sentence, move || {
-                        judge(&task, settings)
-                    }));
+                    let sentence = format!("{} {value:e}, held out: {has_validation}", row.name);
+                    push(asked, usual, sentence, task);
                 }
             }
         }
-        for (sentence, stopping) in [
-            ("one epoch", StoppingRules { epochs: 1, ..usual }),
-            ("no epoch", StoppingRules { epochs: 0, ..usual }),
-            (
-                "a goal beyond the start",
-                StoppingRules {
-                    goal_mse: f64::MAX,
-                    ..usual
-                },
-            ),
-            (
-                "a goal that is not a number",
-                StoppingRules {
-                    goal_mse: f64::NAN,
-                    ..usual
-                },
-            ),
-            (
-                "the largest minimum gradient",
-                StoppingRules {
-                    min_gradient: f64::MAX,
-                    ..usual
-                },
-            ),
-            ("one validation failure", StoppingRules { max_fail: 1, ..usual }),
-            ("no validation failure", StoppingRules { max_fail: 0, ..usual }),
+        for stopping in [
+            StoppingRules { epochs: 1, ..usual },
+            StoppingRules { epochs: 0, ..usual },
+            StoppingRules {
+                goal_mse: f64::MAX,
+                ..usual
+            },
+            StoppingRules {
+                goal_mse: f64::NAN,
+                ..usual
+            },
+            StoppingRules {
+                min_gradient: f64::MAX,
+                ..usual
+            },
+            StoppingRules { max_fail: 1, ..usual },
+            StoppingRules { max_fail: 0, ..usual },
         ] {
-            let settings = TrainingSettings { method, stopping };
-            let task = Task::of(60, 3, 5, 2);
-            jobs.push(Job::one(
-                ROOM,
-                "stopping rules",
-                format!("{name}, {sentence}"),
-                move || judge(&task, settings),
-            ));
+            push(method, stopping, format!("{stopping:?}"), Task::of(60, 3, 5, 2));
         }
     }
     jobs

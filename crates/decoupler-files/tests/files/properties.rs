@@ -4,8 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use decoupler_core::{
     dataset::Dataset,
-    evaluation::{Run, RunSettings},
-    job::Job,
+    evaluation::Run,
     network::{DecouplingNetwork, Mlp, Networks},
     scene::Rows,
     training::Method,
@@ -15,9 +14,12 @@ use decoupler_files::{
     import::{LineParser, ReadingsFile},
 };
 use ndarray::Array2;
-use proptest::prelude::*;
+use proptest::{
+    prelude::*,
+    test_runner::{Config, RngSeed},
+};
 
-use crate::cases;
+use crate::trained::{network, place, resumed, settings, stepped};
 
 /// Readings of every magnitude, row-wires and snapshots of an array of three row-wires, two nodes and six columns.
 fn sets() -> impl Strategy<Value = Dataset> {
@@ -37,25 +39,18 @@ fn sets() -> impl Strategy<Value = Dataset> {
     })
 }
 
-/// Settings of the smallest array with 2 hidden nodes.
-fn small(epochs: usize) -> RunSettings {
-    let mut settings = RunSettings::default();
-    settings.simulation_mut().unwrap().sensor.scale = "1x1_1x3".parse().unwrap();
-    (
-        settings.simulation_mut().unwrap().samples,
-        settings.simulation_mut().unwrap().test_samples,
-    ) = (20, 10);
-    settings.hidden = 2;
-    settings.training.stopping.epochs = epochs;
-    settings
-}
-
 /// The file of a network of the smallest array with 2 hidden nodes.
-static TRAINED: LazyLock<NetworkFile> = LazyLock::new(|| {
-    let mut run = Run::prepare(small(1)).unwrap();
-    while run.step().is_none() {}
-    NetworkFile::from_run(&run, None).unwrap()
-});
+static TRAINED: LazyLock<NetworkFile> = LazyLock::new(|| network("1x1_1x3", 2, 1));
+
+/// Number of cases of a property. They are the same in every run, so failures need no record.
+fn cases(count: u32) -> Config {
+    Config {
+        cases: count,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(2),
+        ..Config::default()
+    }
+}
 
 proptest! {
     #![proptest_config(cases(64))]
@@ -90,8 +85,7 @@ proptest! {
         let mlp = Mlp::from_weights(network.mlp().shape(), weights.clone());
         let network = DecouplingNetwork::new(network.inputs().clone(), mlp, network.outputs().clone());
         file.network = Networks::shared(network);
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("network.json");
+        let (_folder, path) = place();
         file.save(&path).unwrap();
         let read = NetworkFile::load(&path).unwrap();
         prop_assert_eq!(&read, &file);
@@ -107,16 +101,12 @@ proptest! {
         after in 0..6_usize,
         starts in 1..3_usize,
     ) {
-        let mut settings = small(12);
+        let mut settings = settings("1x1_1x3", 2, 12);
         (settings.training.method, settings.starts) = (method, starts);
-        let mut whole = Run::prepare(settings).unwrap();
-        for _ in 0..before {
-            whole.step();
-        }
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("run.checkpoint");
+        let mut whole = stepped(settings, before);
+        let (_folder, path) = place();
         CheckpointFile::from_run(&whole, None).unwrap().save(&path).unwrap();
-        let mut read = CheckpointFile::load(&path).unwrap().resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
+        let mut read = resumed(CheckpointFile::load(&path).unwrap());
         prop_assert_eq!(read.states(), whole.states());
         for _ in 0..after {
             whole.step();

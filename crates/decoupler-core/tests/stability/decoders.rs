@@ -14,7 +14,6 @@ use crate::{
     situations,
 };
 
-const ROOM: &str = "decoder";
 /// Returns the factor by which an error equal to the mean's may vary by chance, on a test set of this many nodes.
 fn by_chance(nodes: usize) -> f64 {
     1.1 + 2.0 / (nodes as f64).sqrt()
@@ -88,7 +87,7 @@ fn judge_decoder(seen: &Measured, settings: &RunSettings, kind: DecoderKind, pre
     let test = seen.run.test();
     let mut decoder = match seen.set.decoder(kind, precision) {
         Ok(Some(decoder)) => decoder,
-        Ok(None) => return Verdict::Refused("there is no such decoder here; choose another".to_owned()),
+        Ok(None) => return Verdict::Refused,
         Err(error) => return refused(&error),
     };
     let answers = match decode_set(&mut *decoder, test) {
@@ -178,6 +177,6 @@ fn judge(settings: &RunSettings) -> Vec<(String, Verdict)> {
 }
 
 pub(crate) fn jobs() -> Vec<Job> {
-    let job = |(extreme, sentence, settings)| Job::new(ROOM, extreme, sentence, move || judge(&settings));
+    let job = |(sentence, settings)| Job::new(sentence, move || judge(&settings));
     situations::all().into_iter().map(job).collect()
 }
