@@ -8,7 +8,7 @@ use std::{
 };
 
 /// The modules of `src/window`; each uses only those before it.
-const ORDER: [&str; 13] = [
+const ORDER: [&str; 14] = [
     "theme",
     "glossary",
     "widgets",
@@ -16,6 +16,7 @@ const ORDER: [&str; 13] = [
     "surface_view",
     "job",
     "test_view",
+    "timeline",
     "preview",
     "training_worker",
     "shared",

@@ -133,7 +133,7 @@ fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
         (format!("{TRAIN} --history 2h"), 2, "write a number of samples as in 20"),
         (
             format!("{TRAIN} --history 0.01s"),
-            1,
+            2,
             "0.01s is shorter than the usual interval",
         ),
         (

@@ -58,7 +58,7 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     driver.wait("the other decoders", answered);
     // One new touch each: the next one begins again.
     panics(&mut driver, "decoders of a press", |driver| {
-        driver.enter("Depth", "0.5");
+        driver.enter("Depth", "0.3");
     });
     driver.enter("Depth", "0.6");
     driver.wait("the other decoders", |driver| {
@@ -85,6 +85,7 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     });
     driver.click_button("Latest");
 
+    driver.details();
     panics(&mut driver, "decoders", |driver| driver.click("More decoders"));
     driver.click("More decoders");
     driver.click("More decoders");

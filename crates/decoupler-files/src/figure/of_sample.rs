@@ -291,7 +291,7 @@ mod live_tests {
         let all = figure(100_000, 0.0..=1e5);
         assert!((2000..4010).contains(&points(&all)), "{}", points(&all));
         let [x, y] = all.plots[0].ranges();
-        assert!(*x.end() == 99_999.0 && *y.end() > 1.5, "{x:?}, {y:?}");
+        assert!(*x.end() >= 99_999.0 && *y.end() > 1.5, "{x:?}, {y:?}");
         let near = figure(100_000, 500.0..=600.0);
         // With the samples on either side, and the end of the line.
         assert_eq!(points(&near), 104);

@@ -204,9 +204,13 @@ impl Decoders {
                 MeasuringEvent::Ended(Ok(())) if self.always.is_empty() => self.fitted = Arc::default(),
                 MeasuringEvent::Ended(Ok(())) => {}
                 MeasuringEvent::Ended(Err(error)) => {
-                    let reason = format!("{error}; close the table and open it again");
-                    for result in results.filter(|result| result.report.is_none()) {
-                        result.report = Some(Err(reason.clone()));
+                    let again = match self.always {
+                        [] => "close the table and open it again",
+                        _ => "press again",
+                    };
+                    // An answer to an earlier press must not stay as if it were the latest.
+                    for result in results.filter(|result| result.report.is_none() || result.is_past) {
+                        (result.report, result.is_past) = (Some(Err(format!("{error}; {again}"))), false);
                     }
                 }
             }

@@ -128,6 +128,14 @@ fn answers_ui(ui: &mut Ui, decoders: &mut Decoders, is_compared: bool, shown: &S
     if let Some(Err(reason)) = &shown.answer {
         note_ui(ui, &format!("Network: {reason}"));
     }
+    let folded = decoders
+        .measured
+        .iter()
+        .flatten()
+        .find(|result| result.kind == DecoderKind::Mean);
+    if let Some(mean) = folded.filter(|_| is_compared && !decoders.is_open) {
+        notes_ui(ui, std::slice::from_ref(mean), false);
+    }
     if is_compared {
         let hint = "Ridge regression, radial-basis network, Newton on Eq. (2) and others on this press.";
         decoders_fold_ui(ui, ("Other decoders", hint), decoders, |ui, measured| {

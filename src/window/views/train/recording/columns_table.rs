@@ -233,7 +233,7 @@ fn range_text(min: f64, max: f64) -> String {
     match ends {
         [end, _] if min == max => end,
         _ if max - min >= 1e-6 && exact.chars().count() <= MAX_CHARACTERS => exact,
-        [one, other] if one == other => format!("{one}, width {}", format_number(max - min)),
+        [one, other] if one == other => format!("{one}, width {}", format_number(max - min).replace('-', "−")),
         ends => ends.join(" – "),
     }
 }
