@@ -156,7 +156,7 @@ fn colours_and_scales_are_chosen_at_the_bar_and_colours_are_remembered() {
     let value = |driver: &Driver, label: &str| driver.get(label).accesskit_node().value().unwrap();
     assert_eq!(value(&driver, "Colour scale of z (mm)"), "4.00 to 5.00");
     driver.click("Colour scale of z (mm)");
-    driver.click("Free");
+    driver.click("Locked");
     driver.settle();
     driver.press(Key::Escape);
     assert_ne!(value(&driver, "Colour scale of z (mm)"), "4.00 to 5.00");

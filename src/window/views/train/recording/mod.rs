@@ -1,7 +1,8 @@
 //! Recordings as the source of a training: their files, the meaning of their columns, and the division of their samples.
 //!
 //! [`editor`] edits the plan of an [`import`]. In the background, [`reading`] inspects files ([`opening`]) and, whenever the plan
-//! has changed, its samples ([`checking`]). [`cures`] mend what is wrong with a plan. [`files_section`] and [`options`] are parts of the form, [`columns_table`] and
+//! has changed, its samples ([`checking`]). [`cures`] mend what is wrong with a plan. [`files_section`] and [`options`] are
+//! parts of the form, [`columns_table`] and
 //! [`samples_card`] the middle of the view.
 
 mod checking;
