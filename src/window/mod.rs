@@ -8,6 +8,7 @@
 //! | `plotting` | drawing of all charts |
 //! | [`surface_view`] | the surface plot |
 //! | `job` | background work |
+//! | `timeline` | places of the test samples of a recording on an axis of time |
 //! | `test_view`, `preview` | test set ready to be drawn; preview of settings before a training |
 //! | `training_worker` | the thread that trains |
 //! | `shared` | state shared by all views: settings, current training, run list, appearance; and the requests of views |

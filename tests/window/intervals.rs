@@ -76,7 +76,7 @@ fn pausing_after_the_last_epoch_keeps_the_intervals() {
 fn stopping_a_calibration_keeps_the_network_without_intervals() {
     // Its five trainings take seconds, and less than the minute above which none is begun on a busy machine too.
     let (mut driver, _, _folder) = opened_text(&noisy(60_000));
-    driver.limit_epochs("60");
+    driver.limit_epochs("300");
     if driver.state().recording.is_auto {
         driver.click("Choose settings automatically");
     }

@@ -503,10 +503,8 @@ mod tests {
             epochs: usize::MAX,
             ..SpeedForm::default()
         };
-        let (settings, preset) = (
-            settings(&plan(&form, base), 1e-3, Preset::Best),
-            Preset::Best.settings(),
-        );
+        let settings = settings(&plan(&form, base), 1e-3, Preset::Best);
+        let preset = Preset::Best.settings_in(settings.simulation().unwrap().scene.noise);
         let (simulation, of_preset) = (settings.simulation().unwrap(), preset.simulation().unwrap());
         assert_eq!(
             (simulation.samples, settings.training),
