@@ -329,6 +329,5 @@ fn the_train_view_has_few_controls() {
     }
     driver.settle();
     let folded = count(&mut driver) - visible;
-    println!("{visible} controls are visible, {folded} folded");
     assert!(visible <= 42 && folded <= 44, "{visible} visible, {folded} folded");
 }

@@ -16,9 +16,8 @@ use eframe::egui::vec2;
 use crate::{
     driver::Driver,
     recordings::{opened, plan, trained},
+    terminal,
 };
-#[path = "../support/terminal.rs"]
-mod terminal;
 
 fn open() -> Driver {
     let mut driver = Driver::open();
