@@ -266,7 +266,7 @@ pub fn row_indices(known: &[usize], row_wires: Option<Vec<usize>>, samples: usiz
 
 /// Training and held-out samples of `set`, as ascending indices.
 pub fn parts(set: &Dataset, division: Division, seed: Seed) -> PyResult<(Vec<usize>, Vec<usize>)> {
-    let training = division.training(set, true, seed).map_err(value_error)?;
+    let training = division.divide(set, true, seed).map_err(value_error)?.training;
     let is_held_out = |sample: &usize| training.binary_search(sample).is_err();
     let held_out = (0..set.samples()).filter(is_held_out).collect();
     Ok((training, held_out))
