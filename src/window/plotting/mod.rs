@@ -1,6 +1,7 @@
 //! Figures on the screen, drawn from the same description as printed figures. Independent of the views.
 //!
-//! `plot` hands plots to `egui_plot`, `series` those of values over time; `paint` paints the shapes of which everything else is made, such as heat maps.
+//! `plot` hands plots to `egui_plot`, `series` those of values over time; `paint` paints the shapes of which everything else is
+//! made, such as heat maps.
 
 mod heat_map;
 mod paint;

@@ -218,11 +218,11 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransf
             .tick_label_color(palette.dim)
             .tick_label_font(FontId::proportional(type_size().small))
     };
-    // Plots below each other are moved together by whoever draws them.
+    // Plots below each other are moved together by the caller.
     let may_move = track.is_none();
     let mut y_hints = axis_hints(AxisHints::new_y(), (&plot.y, space.y), 12.0);
     if track.is_some() {
-        // The names are beside the plots, and their frames are below each other.
+        // The names are next to the plots, and their frames are below each other.
         y_hints = y_hints.label("").min_thickness(NUMBERS);
     }
     // A menu over the plot is not covered by tooltips.

@@ -1,4 +1,4 @@
-//! What is wrong with a recording that a change of its plan mends.
+//! What is wrong with a recording that a change of its plan fixes.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use decoupler_files::import::{Plan, Setup, is_group_name};
 use super::{RecordingEditor, options::bias};
 use crate::window::shared::{Effect, Shared};
 
-/// What is wrong, the text of the button that mends it, and what that does.
+/// What is wrong, the text of the button that fixes it, and what that does.
 pub type Cure = (String, String, Vec<Effect>);
 
 impl RecordingEditor {
@@ -17,8 +17,9 @@ impl RecordingEditor {
         let (Some(import), Ok(open)) = (&self.import, &shared.recording.plan) else {
             return Vec::new();
         };
-        let plan = Plan::clone(open);
-        let mended = |plan: Plan| {
+        // Asked for in every frame: a plan is copied only where there is something to change.
+        let plan: &Plan = open;
+        let fixed = |plan: Plan| {
             let setup = Setup::recording(shared.recording.settings, plan);
             let is_auto = shared.recording.is_auto;
             vec![
@@ -51,7 +52,7 @@ impl RecordingEditor {
             let mut plan = plan.clone();
             let markers = names.iter().filter_map(|name| format!("{name}={value}").parse().ok());
             plan.import.missing.extend(markers);
-            cures.push((text, format!("Treat {shown} as missing"), mended(plan)));
+            cures.push((text, format!("Treat {shown} as missing"), fixed(plan)));
         }
         let mut own = import.files.first().into_iter().flat_map(|file| &file.columns);
         let group = own.find(|column| is_group_name(&column.name) && !is_used(&column.name));
@@ -62,13 +63,13 @@ impl RecordingEditor {
             );
             let mut plan = plan.clone();
             (plan.import.group, plan.division.by) = (Some(column.name.clone()), SplitBy::Group);
-            cures.push((text, format!("Group by {}", column.name), mended(plan)));
+            cures.push((text, format!("Group by {}", column.name), fixed(plan)));
         } else if plan.division.by == SplitBy::Random && plan.test.is_none() {
             let mut plan = plan.clone();
             let has_groups = plan.import.has_groups();
             plan.division.by = if has_groups { SplitBy::Group } else { SplitBy::Time };
             let button = if has_groups { "Split by group" } else { "Split by time" };
-            cures.push((bias(SplitBy::Random).to_owned(), button.to_owned(), mended(plan)));
+            cures.push((bias(SplitBy::Random).to_owned(), button.to_owned(), fixed(plan)));
         }
         cures
     }
