@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, time::Instant};
 
-use decoupler::window::{Effect, Phase};
+use decoupler::window::{Command, Effect, Phase};
 use decoupler_core::job::Job;
 use decoupler_files::export::CheckpointFile;
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
@@ -151,7 +151,7 @@ fn a_training_that_ends_during_the_question_moves_no_button_and_does_not_close_t
     ask(&mut driver);
     let places = |driver: &mut Driver| [STAY, CLOSE, SAVE].map(|label| driver.get(label).rect());
     let before = places(&mut driver);
-    driver.window_mut().apply(Effect::Stop);
+    driver.window_mut().apply(Effect::Do(Command::StopTraining));
     let latest = Instant::now() + PATIENCE;
     while !driver.says("has ended") {
         driver.wait_for_frame("the end", latest);
@@ -282,7 +282,7 @@ fn a_cross_validation_and_an_analysis_are_not_ended_without_asking() {
 fn a_training_being_prepared_is_not_ended_without_asking() {
     let mut driver = Driver::open();
     driver.configure_small();
-    driver.window_mut().apply(Effect::Train);
+    driver.window_mut().apply(Effect::Do(Command::Train));
     assert!(!close(&mut driver), "its samples are being drawn");
     driver.harness().run_steps(2);
     assert!(driver.has("Train: Training"), "{:#?}", driver.texts());

@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, path::Path};
 
-use decoupler::window::{Effect, Phase};
+use decoupler::window::{Command, Effect, Phase};
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{Coverage, Intervals},
@@ -64,7 +64,7 @@ fn pausing_after_the_last_epoch_keeps_the_intervals() {
     driver.click("▶ Train");
     driver.wait("the calibration", |driver| driver.state().phase == Phase::Calibrating);
     // As if clicked before the window knew.
-    driver.window_mut().apply(Effect::Pause);
+    driver.window_mut().apply(Effect::Do(Command::PauseTraining));
     driver.wait_for_training();
     driver.wait_for_kept_run();
     driver.details();
@@ -84,7 +84,7 @@ fn stopping_a_calibration_keeps_the_network_without_intervals() {
     driver.wait("the calibration", |driver| driver.state().phase == Phase::Calibrating);
     assert!(driver.says("Calibrating the 90 % intervals"));
     // As if clicked, but in this frame: on a busy machine a frame takes long.
-    driver.window_mut().apply(Effect::Stop);
+    driver.window_mut().apply(Effect::Do(Command::StopTraining));
     driver.wait_for_training();
     driver.wait_for_kept_run();
     assert_ne!(driver.state().phase, Phase::Ended(StopReason::Stopped));

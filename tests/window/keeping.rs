@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, time::Instant};
 
-use decoupler::window::{Effect, Phase};
+use decoupler::window::Phase;
 use decoupler_core::training::StopReason;
 use decoupler_files::export::{CheckpointFile, CheckpointPlace};
 
@@ -122,7 +122,7 @@ fn two_windows_keep_their_trainings_apart() {
     start_endless(&mut second);
     second.wait("another checkpoint", |_| checkpoints(folder).len() == 2);
     assert!(!second.says(OFFER), "the other window is at work on it");
-    second.window_mut().apply(Effect::Stop);
+    second.click("■ Stop");
     second.wait("its end", |_| checkpoints(folder) == ["training-1.checkpoint"]);
     kill((first, second), folder, 1);
     let driver = offered_in(folder);

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use decoupler::window::{Effect, Phase};
+use decoupler::window::{Command, Effect, Phase};
 use decoupler_core::{
     evaluation::{Run, RunSettings},
     training::{Method, StopReason},
@@ -202,9 +202,9 @@ fn stopping_a_training_being_prepared_takes_effect_at_once_and_the_previous_one_
         let mut many = small();
         many.simulation_mut().unwrap().samples = 200_000;
         driver.window_mut().apply(Effect::Configure(Box::new(many)));
-        driver.window_mut().apply(Effect::Train);
+        driver.window_mut().apply(Effect::Do(Command::Train));
         assert_eq!(driver.state().phase, Phase::Preparing);
-        driver.window_mut().apply(Effect::Stop);
+        driver.window_mut().apply(Effect::Do(Command::StopTraining));
         assert_eq!(driver.state().phase, before);
         driver.window_mut().apply(Effect::Configure(Box::new(small())));
         driver.train();

@@ -26,7 +26,7 @@ use crate::{
     signals::on_termination,
     window::{
         job::{Background, JobError, Wake, start_thread},
-        shared::{FileInUse, FileTask, Matter, ViewKind, refuse_in_use},
+        shared::{Command, FileInUse, FileTask, Matter, ViewKind, refuse_in_use},
         theme::{Theme, radius, space, type_size},
     },
 };
@@ -317,9 +317,6 @@ pub fn open(files: Vec<PathBuf>) -> Result<(), OpenError> {
     }
 }
 
-/// Why no file is opened now.
-const BUSY: &str = "A training is running: stop it before you open other files.";
-
 impl DecouplerWindow {
     /// Gives files dropped on the window to the view that takes them, and shows it.
     pub(super) fn take_dropped(&mut self, ctx: &Context) {
@@ -333,10 +330,9 @@ impl DecouplerWindow {
         if paths.is_empty() {
             return;
         }
-        if self.shared.phase.is_busy() {
-            self.notices.fail(Matter::Recording, BUSY);
-        } else {
-            self.views.open_files(paths);
+        match Command::OpenFiles.obstacle(&self.shared) {
+            Some(obstacle) => self.notices.fail(Matter::Recording, obstacle),
+            None => self.views.open_files(paths),
         }
         self.show(ViewKind::Train);
         ctx.request_repaint();
@@ -359,11 +355,8 @@ impl DecouplerWindow {
         );
         painter.rect(whole, radius(), fill, stroke, StrokeKind::Inside);
         let font = FontId::proportional(type_size().title);
-        let text = if self.shared.phase.is_busy() {
-            BUSY
-        } else {
-            "Drop to open, or to add to the recording"
-        };
+        let text = Command::OpenFiles.obstacle(&self.shared);
+        let text = text.unwrap_or("Drop to open, or to add to the recording");
         painter.text(whole.center(), Align2::CENTER_CENTER, text, font, palette.text);
     }
 }

@@ -11,7 +11,7 @@ use super::{
     modal::Modal,
     notices::Notices,
     remembered::{Memory, Remembered, WindowFile},
-    top_bar::{SMALL, top_bar_ui},
+    top_bar::top_bar_ui,
 };
 use crate::window::{
     job::{Background, Wake},
@@ -187,7 +187,7 @@ impl DecouplerWindow {
             self.fit_the_screen();
         }
         let mut effects = Vec::new();
-        let offers = self.take_commands(ui.ctx(), &mut effects);
+        self.take_commands(ui.ctx(), &mut effects);
         self.take_dropped(ui.ctx());
         let (kind, shared) = (self.shared.shown, &self.shared);
         let view = self.views.get(kind);
@@ -206,14 +206,14 @@ impl DecouplerWindow {
             top: 4,
             bottom: 4,
         };
-        let top_bar = Panel::top("top bar")
+        Panel::top("top bar")
             .exact_size(space(11))
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
-                top_bar_ui(ui, kind, &offers, |ui| {
-                    view.tools_ui(ui, shared, &mut effects);
-                    export_menu_ui(ui, || view.shown(shared), &mut effects);
-                })
+                top_bar_ui(ui, shared, &mut effects, |ui, effects| {
+                    view.tools_ui(ui, shared, effects);
+                    export_menu_ui(ui, || view.shown(shared), effects);
+                });
             });
         let status_line = Panel::bottom("status line")
             .exact_size(space(7))
@@ -221,7 +221,7 @@ impl DecouplerWindow {
             .show(ui, |ui| ui.max_rect());
         // A narrow window does not change the width in a wide one.
         let is_narrow = ui.available_width() < 1400.0;
-        let shows_form = self.shows_form || ui.available_width() >= SMALL;
+        let shows_form = self.shows_form || shared.obstacle(&Command::Form).is_some();
         let form = shows_form.then(|| {
             Panel::left(if is_narrow { "narrow form" } else { "form" })
                 .default_size(self.chosen.form_points.unwrap_or(space(68)))
@@ -264,12 +264,9 @@ impl DecouplerWindow {
         }
         self.notices_ui(ui, middle.response.rect);
         self.apply_all(effects);
-        if let Some(command) = top_bar.inner {
-            self.carry_out(&command);
-        }
         self.undoer
             .feed_state(ui.input(|input| input.time), &drafts(&self.shared));
-        self.modal_ui(ui, &offers);
+        self.modal_ui(ui);
         self.dropping_ui(ui);
         self.remember();
         // Work begun in this frame must be finished too.

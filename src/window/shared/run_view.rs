@@ -2,44 +2,29 @@ use std::time::Duration;
 
 use decoupler_core::{evaluation::TestErrors, text::capitalised, training::StopReason};
 use decoupler_files::export::{format_duration, format_percent};
-use eframe::egui::{Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::Ui;
 
-use super::{Command, Effect, Phase, RunView, Shared, SourceKind, Status, Tone};
+use super::{Command, Effect, Phase, RunView, Shared, SourceKind, Status, Tone, command_button_ui};
 use crate::window::widgets::{ghost_button, primary_button};
 
 /// The buttons that run a training.
 pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-    let phase = shared.phase;
     // In a narrow window the buttons show only their symbols.
     let is_short = ui.ctx().content_rect().width() < 1100.0;
-    let longer = Command::TrainLonger.about();
-    if shared.can_continue() && ui.add(ghost_button(&longer.name)).on_hover_text(longer.hint).clicked() {
-        effects.push(Effect::Continue);
+    let longer = Command::TrainLonger;
+    if shared.obstacle(&longer).is_none() {
+        let button = ghost_button(longer.about().name);
+        command_button_ui(ui, shared, longer, button, None, effects);
     }
-    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
-    let hint = Command::Train.about().tooltip(ui.ctx());
-    if train.on_hover_text(hint).clicked() {
-        effects.push(Effect::Train);
+    command_button_ui(ui, shared, Command::Train, primary_button("▶ Train"), None, effects);
+    let pause = match shared.phase {
+        Phase::Paused => (Command::ResumeTraining, "▶ Resume"),
+        _ => (Command::PauseTraining, "⏸ Pause"),
+    };
+    for (command, text) in [pause, (Command::StopTraining, "■ Stop")] {
+        let shown = text.split(' ').next().filter(|_| is_short).unwrap_or(text);
+        command_button_ui(ui, shared, command, ghost_button(shown), Some(text), effects);
     }
-    let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, command: Command, effect: Effect| {
-        let shown = if is_short {
-            text.split(' ').next().unwrap_or(text)
-        } else {
-            text
-        };
-        let button = ui.add_enabled(is_possible, ghost_button(shown));
-        button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, text));
-        if button.on_hover_text(command.about().tooltip(ui.ctx())).clicked() {
-            effects.push(effect);
-        }
-    };
-    let (text, command, effect) = match phase {
-        Phase::Paused => ("▶ Resume", Command::ResumeTraining, Effect::Resume),
-        _ => ("⏸ Pause", Command::PauseTraining, Effect::Pause),
-    };
-    let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-    button_ui(ui, text, can_pause, command, effect);
-    button_ui(ui, "■ Stop", phase.is_busy(), Command::StopTraining, Effect::Stop);
 }
 
 /// Returns the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of

@@ -14,7 +14,7 @@ use decoupler_files::{
     export::{Cell, NetworkFile, Table, TableColumn, atomic_write, is_same},
     live::{Input, LiveArray, Recorded, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
 };
-use eframe::egui::{Ui, Widget};
+use eframe::egui::Ui;
 
 use super::{
     cards::{self, surface_figure},
@@ -22,12 +22,11 @@ use super::{
     form::{Picked, SourceForm, SourceKind, form_ui},
 };
 use crate::window::{
-    glossary,
     job::{Background, Wake},
     plotting::{MAX_TRACKS, SeriesView},
     shared::{
         Command, Effect, FileInUse, FileTask, FileWords, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Tone,
-        View,
+        View, command_button_ui,
     },
     theme::space,
     widgets::{ghost_button, primary_button},
@@ -381,8 +380,19 @@ impl View for LiveView {
 
     fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
         for command in COMMANDS {
-            if offers.offer(command.clone(), obstacle(&command, self, shared).is_none()) {
-                carry_out(&command, self, shared, effects);
+            if !offers.offer_unless(command.clone(), obstacle(&command, self, shared)) {
+                continue;
+            }
+            match command {
+                // The thread ends once the sender of its requests is dropped; the last frame stays on the screen.
+                Command::Cancel(_) => self.running = None,
+                Command::Begin(_) => self.start(shared, effects),
+                Command::Record => self.record(shared),
+                Command::ReZero => self.re_zero(),
+                _ => {
+                    let plays = self.shown.replay.is_some_and(|replay| !replay.is_playing);
+                    self.control(move |control, now| control.play(plays, now));
+                }
             }
         }
     }
@@ -440,20 +450,7 @@ const COMMANDS: [Command; 5] = [
     Command::PlayReplay,
 ];
 
-/// Returns the text of the button of a command.
-fn button(command: &Command, view: &LiveView) -> &'static str {
-    match command {
-        Command::Cancel(_) => "■ Stop",
-        Command::Begin(_) => "▶ Start",
-        Command::Record if view.is_recording() => "■ End recording",
-        Command::Record => "● Record",
-        Command::ReZero => "Re-zero",
-        _ if view.shown.replay.is_some_and(|replay| replay.is_playing) => "⏸ Pause",
-        _ => "▶ Play",
-    }
-}
-
-/// Returns the reason why a command is not available now, if there is one.
+/// Returns the reason why a command is not available now: whether a source runs, and which, only this view knows.
 fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<String> {
     let (is_running, is_replay) = (view.running.is_some(), view.shown.replay.is_some());
     let reason = match command {
@@ -468,43 +465,25 @@ fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<Strin
     Some(reason.to_owned())
 }
 
-fn carry_out(command: &Command, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    match command {
-        // The thread ends once the sender of its requests is dropped; the last frame stays on the screen.
-        Command::Cancel(_) => view.running = None,
-        Command::Begin(_) => view.start(shared, effects),
-        Command::Record => view.record(shared),
-        Command::ReZero => view.re_zero(),
-        _ => {
-            let plays = view.shown.replay.is_some_and(|replay| !replay.is_playing);
-            view.control(move |control, now| control.play(plays, now));
-        }
-    }
-}
-
 /// Shows the button of a command.
-pub(super) fn command_ui(
-    ui: &mut Ui,
-    command: &Command,
-    view: &mut LiveView,
-    shared: &Shared,
-    effects: &mut Vec<Effect>,
-) {
-    let (about, obstacle, text) = (command.about(), obstacle(command, view, shared), button(command, view));
-    let hint = match about.keys {
-        Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
-        None => glossary::UNLOADED_STATE.hint.to_owned(),
+pub(super) fn command_ui(ui: &mut Ui, command: &Command, view: &LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let is_playing = view.shown.replay.is_some_and(|replay| replay.is_playing);
+    let text = match command {
+        Command::Begin(_) => {
+            return command_button_ui(ui, shared, command.clone(), primary_button("▶ Start"), None, effects);
+        }
+        Command::Cancel(_) => "■ Stop",
+        Command::Record if view.is_recording() => "■ End recording",
+        Command::Record => "● Record",
+        Command::ReZero => "Re-zero",
+        _ if is_playing => "⏸ Pause",
+        _ => "▶ Play",
     };
-    let button = ui.add_enabled_ui(obstacle.is_none(), |ui| match command {
-        Command::Begin(_) => primary_button(text).ui(ui),
-        Command::PlayReplay => ui.add(ghost_button(text).min_size([space(18), space(6)].into())),
-        Command::Record => ui.add(ghost_button(text).selected(view.is_recording())),
-        _ => ui.add(ghost_button(text)),
-    });
-    let button = button.inner.on_hover_text(hint);
-    if button.on_disabled_hover_text(obstacle.unwrap_or_default()).clicked() {
-        carry_out(command, view, shared, effects);
+    let mut button = ghost_button(text).selected(*command == Command::Record && view.is_recording());
+    if *command == Command::PlayReplay {
+        button = button.min_size([space(18), space(6)].into());
     }
+    command_button_ui(ui, shared, command.clone(), button, None, effects);
 }
 
 fn values_table(answer: &Answered) -> Table {

@@ -19,12 +19,17 @@ use decoupler_files::{
 
 use eframe::egui::{Sense, Ui};
 
-use super::{Form, Outcome, Report, StudyEvent, Task, Topic, report::Look, sweep_folder};
+use super::{
+    Form, Outcome, Report, StudyEvent, Task, Topic,
+    report::Look,
+    sweep_folder,
+    view::{BEGIN, CANCEL},
+};
 use crate::window::{
     job::{Background, Wake},
     shared::{
-        Command, Effect, Holdings, Matter, Notice, Offers, Phase, RecordingDraft, Shared, Shown, SourceKind, Status,
-        Tone, Unfinished, View, ViewKind,
+        Effect, Holdings, Matter, Notice, Offers, Phase, RecordingDraft, Shared, Shown, SourceKind, Status, Tone,
+        Unfinished, View, ViewKind,
     },
     widgets::{card_ui, placeholder_ui, scrolled_ui},
 };
@@ -134,15 +139,14 @@ impl StudyView {
         self.checked_on = Some(basis);
     }
 
-    pub(super) fn can_begin(&self) -> bool {
-        self.running.is_none() && self.task.is_ok()
+    /// Returns the reason why the task of the form cannot begin now.
+    fn obstacle(&self) -> Option<String> {
+        let running = self.running.map(|topic| format!("{} is under way.", topic.name()));
+        running.or_else(|| self.task.as_ref().err().cloned())
     }
 
     /// Begins the task of the form.
-    pub(super) fn begin(&mut self, effects: &mut Vec<Effect>) {
-        if !self.can_begin() {
-            return;
-        }
+    fn begin(&mut self, effects: &mut Vec<Effect>) {
         // The form is checked again for the next one.
         self.checked_on = None;
         if let Ok(task) = std::mem::replace(&mut self.task, Err(String::new())) {
@@ -167,7 +171,7 @@ impl StudyView {
     }
 
     /// Cancels the task under way; finished parts are kept.
-    pub(super) fn cancel(&mut self) {
+    fn cancel(&mut self) {
         self.job.abandon();
         self.end();
     }
@@ -213,7 +217,7 @@ impl StudyView {
         let under_way = |topic| Some((topic, self.studies.get(&topic)?));
         let Some((topic, study)) = self.running.and_then(under_way) else {
             let Some((study, took)) = self.study().and_then(|study| Some((study, study.took?))) else {
-                let text = if self.can_begin() {
+                let text = if self.obstacle().is_none() {
                     "Ready: press Run"
                 } else {
                     "Not ready"
@@ -287,10 +291,11 @@ impl View for StudyView {
     }
 
     fn take_commands(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {
-        if offers.offer(Command::Begin("Begin the study"), self.can_begin()) {
+        if offers.offer_unless(BEGIN, self.obstacle()) {
             self.begin(effects);
         }
-        if offers.offer(Command::Cancel("Cancel the study"), self.running.is_some()) {
+        let is_idle = self.running.is_none();
+        if offers.offer_unless(CANCEL, is_idle.then_some("Nothing is under way.")) {
             self.cancel();
         }
     }
@@ -320,8 +325,8 @@ impl View for StudyView {
         self.exports(shared.look.colours)
     }
 
-    fn form_ui(&mut self, ui: &mut Ui, _shared: &Shared, effects: &mut Vec<Effect>) {
-        scrolled_ui(ui, "study form", |ui| self.fields_ui(ui, effects));
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        scrolled_ui(ui, "study form", |ui| self.fields_ui(ui, shared, effects));
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {

@@ -20,12 +20,12 @@ use crate::window::{
     job::Wake,
     plotting::SeriesView,
     shared::{
-        Command, Effect, Holdings, NetworkSource, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind,
-        Status, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, NetworkSource, Offers, RightCard, RunResult, Shared, Shown, SourceKind, Status,
+        Unfinished, View, run_buttons_ui,
     },
     test_view::{Drawing, TestView},
     theme::space,
-    widgets::{card_ui, snapshot_ui},
+    widgets::{card_ui, neighbours, snapshot_ui},
 };
 
 impl View for TrainView {
@@ -57,43 +57,38 @@ impl View for TrainView {
                 .take_pointer(offers.ctx, shared.skin().map(|skin| &**skin), lit);
             self.follow(shared);
         }
-        let phase = shared.phase;
-        let (pause, paused) = match phase {
-            Phase::Paused => (Command::ResumeTraining, Effect::Resume),
-            _ => (Command::PauseTraining, Effect::Pause),
-        };
-        let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-        for (command, is_possible, effect) in [
-            (Command::Train, !phase.is_busy(), Effect::Train),
-            (Command::TrainLonger, shared.can_continue(), Effect::Continue),
-            (pause, can_pause, paused),
-            (Command::StopTraining, phase.is_busy(), Effect::Stop),
+        for command in [
+            Command::Train,
+            Command::TrainLonger,
+            Command::PauseTraining,
+            Command::ResumeTraining,
+            Command::StopTraining,
         ] {
-            if offers.offer(command, is_possible) {
-                effects.push(effect);
+            if offers.offer(command.clone()) {
+                effects.push(Effect::Do(command));
             }
         }
-        if offers.offer(Command::OpenFiles, !phase.is_busy()) {
+        if offers.offer(Command::OpenFiles) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
-        let ended = shared.shown_run().filter(|run| run.stop_reason.is_some());
-        if offers.offer(Command::DecodeFile, ended.is_some())
-            && let Some(run) = ended
+        if offers.offer(Command::DecodeFile)
+            && let Some(run) = shared.shown_run()
         {
             effects.push(Effect::ChooseFile(NetworkSource::of(run).decode()));
         }
         if let Some(skin) = shared.skin()
-            && offers.offer(Command::PressMiddle, true)
+            && offers.offer(Command::PressMiddle)
         {
             self.press.press_middle(skin);
         }
-        let snapshots = shared.test().map_or(0, TestView::snapshots);
-        let has_next = self.snapshot + 1 < snapshots;
-        if offers.offer(Command::NextSample, has_next) {
-            self.show_snapshot(self.snapshot + 1);
-        }
-        if offers.offer(Command::PreviousSample, self.snapshot > 0) {
-            self.show_snapshot(self.snapshot - 1);
+        let next_to = neighbours(self.snapshot, shared.test().map_or(0, TestView::snapshots));
+        for (command, snapshot) in [Command::PreviousSample, Command::NextSample].into_iter().zip(next_to) {
+            if offers.offer_unless(
+                command,
+                snapshot.is_none().then_some("There is no other in this direction."),
+            ) {
+                self.show_snapshot(snapshot.unwrap_or(self.snapshot));
+            }
         }
         self.offer_charts(offers, shared);
     }

@@ -6,7 +6,7 @@ use decoupler_core::dataset::SplitBy;
 use decoupler_files::import::{Plan, Setup, is_group_name};
 
 use super::{RecordingEditor, options::bias};
-use crate::window::shared::{Effect, Shared};
+use crate::window::shared::{Command, Effect, Shared};
 
 /// What is wrong, the text of the button that fixes it, and what that does.
 pub type Cure = (String, String, Vec<Effect>);
@@ -25,7 +25,7 @@ impl RecordingEditor {
             vec![
                 Effect::TakeSetup(Box::new(setup)),
                 Effect::ChooseAutomatically(is_auto),
-                Effect::Train,
+                Effect::Do(Command::Train),
             ]
         };
         let mut cures = Vec::new();

@@ -15,7 +15,7 @@ use super::{
     reading::State,
 };
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Shared, file_stem, sentence},
+    shared::{Command, Effect, FileTask, FileWords, Shared, file_stem, sentence},
     widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
 };
 
@@ -116,7 +116,7 @@ impl RecordingEditor {
                 "Open file…"
             };
             if ui.add(ghost_button(text)).on_hover_text(FILES.description).clicked() {
-                effects.push(Effect::ChooseFile(self.open_task()));
+                effects.push(Effect::Do(Command::OpenFiles));
             }
             if self.reading.is_opening() {
                 if ui.add(ghost_button("Cancel")).clicked() {
