@@ -254,7 +254,7 @@ fn files_dropped_while_a_training_runs_change_nothing() {
     driver.wait("an epoch", |driver| driver.state().result().is_some());
     driver.drop_files(&[&other]);
     driver.wait("the refusal", |driver| {
-        driver.says("A training is running: stop it before you open other files.")
+        driver.says("A training is running: stop it first.")
     });
     assert_eq!(driver.state().phase, Phase::Training);
     driver.click("■ Stop");

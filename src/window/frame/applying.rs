@@ -14,7 +14,7 @@ use crate::window::{
         SourceKind, ToCopy, ViewKind,
     },
     theme,
-    training_worker::{LOST, Origin, Request, RunView, TrainedRun},
+    training_worker::{LOST, Origin, Request, RunView, TrainedRun, Worker},
     views::CHECKPOINT,
 };
 use decoupler_core::{evaluation::RunSettings, training::StopReason};
@@ -138,7 +138,7 @@ impl DecouplerWindow {
 
     /// Starts the worker again after it died.
     pub(super) fn restart_worker(&mut self) {
-        self.worker.restart(Arc::clone(&self.wake));
+        self.worker = Worker::start(&self.jobs);
         self.keep_trainings();
     }
 

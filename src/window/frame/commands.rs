@@ -113,11 +113,7 @@ impl DecouplerWindow {
                 self.notices.settle(Matter::Settings);
                 self.worker.ask(Request::Continue(shared.settings().training));
             }
-            Command::PauseTraining => {
-                shared.phase = Phase::Paused;
-                self.worker.ask(Request::Pause);
-            }
-            Command::ResumeTraining => {
+            Command::PauseTraining if shared.phase == Phase::Paused => {
                 // The settings on the left are always those of the running training.
                 if let Some(run) = &mut shared.run {
                     run.is_saved = false;
@@ -126,6 +122,10 @@ impl DecouplerWindow {
                 }
                 shared.phase = Phase::Training;
                 self.worker.ask(Request::Resume);
+            }
+            Command::PauseTraining => {
+                shared.phase = Phase::Paused;
+                self.worker.ask(Request::Pause);
             }
             Command::StopTraining => {
                 self.worker.ask(Request::Stop);

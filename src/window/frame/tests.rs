@@ -103,7 +103,7 @@ fn save_task(window: &DecouplerWindow) -> FileTask {
 fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
     let mut window = Opened::trained();
     let ended = window.shared.phase;
-    window.worker = Worker::dying(Arc::clone(&window.wake));
+    window.worker = Worker::dying(&window.jobs);
     window.wait(|window| window.notice().is_some());
     let Some(Notice::Failed(reason)) = window.notice() else {
         panic!("{:?}", window.notice())
@@ -136,7 +136,7 @@ fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
 #[test]
 fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
     let mut window = Opened::new();
-    window.worker = Worker::dying(Arc::clone(&window.wake));
+    window.worker = Worker::dying(&window.jobs);
     window.wait(|window| {
         window
             .shared

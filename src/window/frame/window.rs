@@ -14,7 +14,7 @@ use super::{
     top_bar::top_bar_ui,
 };
 use crate::window::{
-    job::{Background, Wake},
+    job::{Background, Jobs, Wake},
     preview::PreviewEvent,
     shared::{Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
     theme::{self, Theme, space},
@@ -53,7 +53,7 @@ pub struct DecouplerWindow {
     pub(super) chosen: Remembered,
     /// The file that keeps what is restored at the next start, if there is one.
     pub(super) memory: Option<Memory>,
-    pub(super) wake: Wake,
+    pub(super) jobs: Jobs,
     pub(super) ctx: Context,
     /// Files that the window was opened with.
     pub(super) given: Vec<PathBuf>,
@@ -81,7 +81,8 @@ impl DecouplerWindow {
         // Our own shortcuts keep to sizes at which everything fits.
         ctx.options_mut(|options| options.zoom_with_keyboard = false);
         let mut shared = Shared::new(is_dark);
-        let mut views = Views::new(&wake);
+        let jobs = Jobs::new(wake);
+        let mut views = Views::new(&jobs);
         shared.look.colours = remembered.colours.unwrap_or(shared.look.colours);
         shared.draft = remembered.draft.unwrap_or(shared.draft);
         if let Some(settings) = remembered.recording {
@@ -105,19 +106,19 @@ impl DecouplerWindow {
             notices: Notices::default(),
             modal: None,
             opened: None,
-            worker: Worker::start(Arc::clone(&wake)),
+            worker: Worker::start(&jobs),
             keeping: None,
-            previews: Background::new("preview", Arc::clone(&wake)),
-            runs: RunsWorker::start(Arc::clone(&wake)),
-            opening: Background::new("opened run", Arc::clone(&wake)),
-            files: Files::new(Arc::clone(&wake)),
-            pictures: Background::prompt("picture", Arc::clone(&wake)),
-            dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
+            previews: Background::new("preview", &jobs),
+            runs: RunsWorker::start(&jobs),
+            opening: Background::new("opened run", &jobs),
+            files: Files::new(jobs.clone()),
+            pictures: Background::prompt("picture", &jobs),
+            dialogs: Dialogs::new(desktop, jobs.clone()),
             picked: None,
             undoer: DraftsUndoer::default(),
-            memory: file.map(|file| Memory::new(file, Arc::clone(&wake))),
+            memory: file.map(|file| Memory::new(file, &jobs)),
             chosen: remembered,
-            wake,
+            jobs,
             ctx: ctx.clone(),
             given: Vec::new(),
             is_new: true,
@@ -307,6 +308,13 @@ pub(super) fn changes_something(ctx: &Context) -> bool {
         };
         input.events.iter().any(is_change)
     })
+}
+
+impl Drop for DecouplerWindow {
+    /// Asks all jobs to end, before each is waited for.
+    fn drop(&mut self) {
+        self.jobs.cancel_all();
+    }
 }
 
 impl eframe::App for DecouplerWindow {

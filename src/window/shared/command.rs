@@ -4,6 +4,7 @@ use decoupler_files::figure::SequentialMap;
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers, Ui, Widget, WidgetInfo, accesskit::Role};
 
 use super::{Effect, Phase, Shared, ViewKind};
+use crate::window::widgets::neighbours;
 
 /// Something that the user can do by a key, or by picking it from the list of all commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -13,7 +14,6 @@ pub enum Command {
     Train,
     TrainLonger,
     PauseTraining,
-    ResumeTraining,
     StopTraining,
     OpenFiles,
     DecodeFile,
@@ -23,8 +23,7 @@ pub enum Command {
     Chart(&'static str),
     NextSection,
     PreviousSection,
-    SectionAlongColumns,
-    SectionAlongRows,
+    TurnSection,
     // Of other views, which name their work: "Run experiment".
     Begin(&'static str),
     Cancel(&'static str),
@@ -77,8 +76,7 @@ impl Command {
                 None,
                 "Continue from the current weights with the method and the epochs on the left, counted from here.",
             ),
-            Self::PauseTraining => ("Pause training", ctrl(Key::P), ""),
-            Self::ResumeTraining => ("Resume training", ctrl(Key::P), ""),
+            Self::PauseTraining => ("Pause or resume training", ctrl(Key::P), ""),
             Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
             Self::OpenFiles => ("Open files", None, "A recording, recipe, network or checkpoint."),
             Self::DecodeFile => (
@@ -92,8 +90,7 @@ impl Command {
             Self::Chart(name) => (*name, None, "Show this chart."),
             Self::NextSection => ("Next section", plain(Key::CloseBracket), ""),
             Self::PreviousSection => ("Previous section", plain(Key::OpenBracket), ""),
-            Self::SectionAlongColumns => ("Section along a column-wire", plain(Key::Backslash), ""),
-            Self::SectionAlongRows => ("Section along a row-wire", plain(Key::Backslash), ""),
+            Self::TurnSection => ("Section along the other wire", plain(Key::Backslash), ""),
             Self::Begin(name) => (*name, ctrl(Key::Enter), "Start."),
             Self::Cancel(name) => (*name, ctrl(Key::Period), "Stop; what has finished is kept."),
             Self::Record => ("Start or end recording", ctrl(Key::R), "Write each frame to a file."),
@@ -139,20 +136,16 @@ impl Command {
     /// Returns the reason why it is not available now, if the shared state has one. What only a view or the frame knows, such
     /// as the displayed sample or the size of the window, it adds where it offers the command.
     pub fn obstacle(&self, shared: &Shared) -> Option<&'static str> {
+        const RUNNING: &str = "A training is running: stop it first.";
         let phase = shared.phase;
         let has_trained = || shared.shown_run().is_some_and(|run| run.stop_reason.is_some());
         let (is_met, obstacle) = match self {
-            Self::Train | Self::Undo | Self::Redo => (!phase.is_busy(), "A training is running: stop it first."),
-            Self::OpenFiles => (
-                !phase.is_busy(),
-                "A training is running: stop it before you open other files.",
+            Self::Train | Self::OpenFiles | Self::Undo | Self::Redo => (!phase.is_busy(), RUNNING),
+            Self::TrainLonger => (shared.can_continue(), "No training of these samples has ended."),
+            Self::PauseTraining => (
+                matches!(phase, Phase::Training | Phase::Paused),
+                "No training is running.",
             ),
-            Self::TrainLonger => (
-                shared.can_continue(),
-                "It continues a training that has ended, with the same samples and network.",
-            ),
-            Self::PauseTraining => (phase == Phase::Training, "No training is running."),
-            Self::ResumeTraining => (phase == Phase::Paused, "No training is paused."),
             Self::StopTraining => (phase.is_busy(), "No training is running."),
             Self::DecodeFile => (has_trained(), "Train a network first."),
             Self::Show(view) => (*view != shared.shown, "It is the current view."),
@@ -230,6 +223,15 @@ impl<'a> Offers<'a> {
         let of = None;
         self.list.push(Offer { command, obstacle, of });
         is_possible && (is_picked || is_pressed)
+    }
+
+    /// Offers the steps to the samples before and after the displayed one. Returns the sample to show.
+    pub fn offer_samples(&mut self, shown: usize, samples: usize) -> Option<usize> {
+        let steps = [Command::PreviousSample, Command::NextSample].into_iter();
+        let steps = steps.zip(neighbours(shown, samples));
+        let asked =
+            steps.filter(|(step, to)| self.offer_unless(step.clone(), to.is_none().then_some("It is the last one.")));
+        asked.last()?.1
     }
 
     /// Returns the commands in the order in which they were offered.

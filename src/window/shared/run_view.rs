@@ -17,11 +17,12 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         command_button_ui(ui, shared, longer, button, None, effects);
     }
     command_button_ui(ui, shared, Command::Train, primary_button("▶ Train"), None, effects);
-    let pause = match shared.phase {
-        Phase::Paused => (Command::ResumeTraining, "▶ Resume"),
-        _ => (Command::PauseTraining, "⏸ Pause"),
+    let pause = if shared.phase == Phase::Paused {
+        "▶ Resume"
+    } else {
+        "⏸ Pause"
     };
-    for (command, text) in [pause, (Command::StopTraining, "■ Stop")] {
+    for (command, text) in [(Command::PauseTraining, pause), (Command::StopTraining, "■ Stop")] {
         let shown = text.split(' ').next().filter(|_| is_short).unwrap_or(text);
         command_button_ui(ui, shared, command, ghost_button(shown), Some(text), effects);
     }

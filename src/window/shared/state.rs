@@ -44,8 +44,6 @@ pub struct Shared {
     pub look: Look,
     /// The displayed view.
     pub shown: ViewKind,
-    /// The views whose threads compute.
-    pub working: Vec<ViewKind>,
     /// The commands of this frame.
     pub offers: Vec<Offer>,
 }
@@ -151,7 +149,6 @@ impl Shared {
                 error_limit_mm: None,
             },
             shown: ViewKind::default(),
-            working: Vec::new(),
             offers: Vec::new(),
         }
     }

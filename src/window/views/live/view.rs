@@ -22,13 +22,12 @@ use super::{
     form::{Picked, SourceForm, SourceKind, form_ui},
 };
 use crate::window::{
-    job::{Background, Wake},
+    job::{Background, Jobs},
     plotting::{MAX_TRACKS, SeriesView},
     shared::{
         Command, Effect, FileInUse, FileTask, FileWords, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Tone,
         View, command_button_ui,
     },
-    theme::space,
     widgets::{ghost_button, primary_button},
 };
 
@@ -79,8 +78,8 @@ impl Running {
 }
 
 impl LiveView {
-    /// Creates the view without frames; `wake` is called when there are events.
-    pub fn new(wake: Wake) -> Self {
+    /// Creates the view without frames.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             shown: Snapshot::default(),
             running: None,
@@ -91,8 +90,8 @@ impl LiveView {
             node: None,
             chosen: None,
             is_to_be_drawn: false,
-            loading: Background::prompt("network file", Arc::clone(&wake)),
-            job: Background::prompt("live", wake),
+            loading: Background::prompt("network file", jobs),
+            job: Background::prompt("live decoding", jobs),
         }
     }
 
@@ -372,14 +371,13 @@ impl View for LiveView {
         let recorded = self.shown.recorded.as_ref().filter(|_| self.is_recording());
         let recorded = recorded.map(|recorded| FileInUse::Recorded(recorded.path.clone()));
         Holdings {
-            is_computing: self.running.is_some(),
             files: replayed.into_iter().chain(recorded).collect(),
             ..Holdings::default()
         }
     }
 
     fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-        for command in COMMANDS {
+        for command in [STOP, START, Command::Record, Command::ReZero, Command::PlayReplay] {
             if !offers.offer_unless(command.clone(), obstacle(&command, self, shared)) {
                 continue;
             }
@@ -398,10 +396,19 @@ impl View for LiveView {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let primary = &COMMANDS[usize::from(self.running.is_none())];
-        let others = if self.has_sensor(shared) { &COMMANDS[2..4] } else { &[] };
-        for command in others.iter().rev().chain([primary]) {
-            command_ui(ui, command, self, shared, effects);
+        if self.has_sensor(shared) {
+            command_button_ui(ui, shared, Command::ReZero, ghost_button("Re-zero"), None, effects);
+            let text = if self.is_recording() {
+                "■ End recording"
+            } else {
+                "● Record"
+            };
+            let record = ghost_button(text).selected(self.is_recording());
+            command_button_ui(ui, shared, Command::Record, record, None, effects);
+        }
+        match self.running {
+            Some(_) => command_button_ui(ui, shared, STOP, ghost_button("■ Stop"), None, effects),
+            None => command_button_ui(ui, shared, START, primary_button("▶ Start"), None, effects),
         }
     }
 
@@ -441,14 +448,11 @@ impl View for LiveView {
     }
 }
 
-/// Commands on a source, from right to left.
-const COMMANDS: [Command; 5] = [
-    Command::Cancel("Stop live decoding"),
-    Command::Begin("Start live decoding"),
-    Command::Record,
-    Command::ReZero,
-    Command::PlayReplay,
-];
+/// Ends decoding.
+const STOP: Command = Command::Cancel("Stop live decoding");
+
+/// Begins decoding.
+const START: Command = Command::Begin("Start live decoding");
 
 /// Returns the reason why a command is not available now: whether a source runs, and which, only this view knows.
 fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<String> {
@@ -463,27 +467,6 @@ fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<Strin
         _ => return None,
     };
     Some(reason.to_owned())
-}
-
-/// Shows the button of a command.
-pub(super) fn command_ui(ui: &mut Ui, command: &Command, view: &LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let is_playing = view.shown.replay.is_some_and(|replay| replay.is_playing);
-    let text = match command {
-        Command::Begin(_) => {
-            return command_button_ui(ui, shared, command.clone(), primary_button("▶ Start"), None, effects);
-        }
-        Command::Cancel(_) => "■ Stop",
-        Command::Record if view.is_recording() => "■ End recording",
-        Command::Record => "● Record",
-        Command::ReZero => "Re-zero",
-        _ if is_playing => "⏸ Pause",
-        _ => "▶ Play",
-    };
-    let mut button = ghost_button(text).selected(*command == Command::Record && view.is_recording());
-    if *command == Command::PlayReplay {
-        button = button.min_size([space(18), space(6)].into());
-    }
-    command_button_ui(ui, shared, command.clone(), button, None, effects);
 }
 
 fn values_table(answer: &Answered) -> Table {

@@ -26,10 +26,10 @@ use super::{
     view::{BEGIN, CANCEL},
 };
 use crate::window::{
-    job::{Background, Wake},
+    job::{Background, Jobs},
     shared::{
-        Effect, Holdings, Matter, Notice, Offers, Phase, RecordingDraft, Shared, Shown, SourceKind, Status, Tone,
-        Unfinished, View, ViewKind,
+        Effect, Holdings, Matter, Notice, Offers, RecordingDraft, Shared, Shown, SourceKind, Status, Tone, Unfinished,
+        View,
     },
     widgets::{card_ui, placeholder_ui, scrolled_ui},
 };
@@ -53,8 +53,6 @@ pub struct StudyView {
     /// Folders of sweeps that were chosen.
     pub(super) folders: (Sender<PathBuf>, Receiver<PathBuf>),
     job: Background<StudyEvent>,
-    /// True while nothing else computes, which would distort times.
-    is_quiet: Arc<AtomicBool>,
 }
 
 /// Source and settings of the Train view.
@@ -89,8 +87,8 @@ impl fmt::Debug for StudyView {
 }
 
 impl StudyView {
-    /// Creates the view without results; `wake` is called when there are events.
-    pub fn new(wake: Wake) -> Self {
+    /// Creates the view without results.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             topic: Topic::ALL[0],
             forms: Topic::ALL.map(|topic| (topic, Form::new(topic))).into(),
@@ -102,8 +100,7 @@ impl StudyView {
             running: None,
             look: Look::default(),
             folders: channel(),
-            job: Background::new("study", wake),
-            is_quiet: Arc::new(AtomicBool::new(true)),
+            job: Background::new("study", jobs),
         }
     }
 
@@ -132,7 +129,7 @@ impl StudyView {
             self.studies
                 .retain(|_, study| study.took.is_none() || study.setup.as_ref().is_none_or(is_its));
         }
-        self.task = self.forms[&self.topic].task(&self.train, &self.is_quiet);
+        self.task = self.forms[&self.topic].task(&self.train);
         if let Ok(Task { study, .. }) = &mut self.task {
             study.report = study.outcome.report(&self.limits);
         }
@@ -232,8 +229,8 @@ impl StudyView {
             let (name, took) = (self.topic.name(), format_duration(took));
             return Status::new(tone, format!("{name} {ended}: {} in {took}", study.standing()));
         };
-        if topic == Topic::Speed && !self.is_quiet.load(Ordering::Relaxed) {
-            let text = "Waiting: a training or other work is under way and would distort the times.";
+        if let (Topic::Speed, Some(other)) = (topic, self.job.distorted_by()) {
+            let text = format!("Waiting: {other} is under way and would distort the times.");
             return Status::new(Tone::Warning, text);
         }
         let (name, parts) = (topic.name(), study.outcome.parts());
@@ -253,9 +250,6 @@ impl StudyView {
 
 impl View for StudyView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        let trains = matches!(shared.phase, Phase::Preparing | Phase::Training | Phase::Calibrating);
-        let is_alone = shared.working.iter().all(|view| *view == ViewKind::Study);
-        self.is_quiet.store(is_alone && !trains, Ordering::Relaxed);
         self.check(shared);
         let mut changed = None;
         while let Some(event) = self.job.next_event() {
@@ -312,10 +306,9 @@ impl View for StudyView {
                 false => is_unsaved.then(|| format!("{standing} finished, not exported as a table"))?,
             };
             // Watching a folder is no work.
-            (!progress.is_empty()).then(|| Unfinished::new(topic.name(), progress))
+            (!progress.is_empty()).then(|| Unfinished::new("Study", topic.name(), progress))
         };
         Holdings {
-            is_computing: self.running.is_some(),
             unfinished: Topic::ALL.into_iter().filter_map(unfinished).collect(),
             files: Vec::new(),
         }

@@ -491,19 +491,15 @@ impl TrainView {
         };
         for (by, command) in [(-1, Command::PreviousSection), (1, Command::NextSection)] {
             let stepped = self.section.stepped(by, skin);
-            if offers.offer_unless(
-                command,
-                stepped.is_none().then_some("There is no other in this direction."),
-            ) {
+            if offers.offer_unless(command, stepped.is_none().then_some("It is the last one.")) {
                 self.section = stepped.unwrap_or(self.section);
             }
         }
-        let (command, other) = match self.section.along {
-            Along::RowWires => (Command::SectionAlongColumns, Along::ColumnWires),
-            Along::ColumnWires => (Command::SectionAlongRows, Along::RowWires),
-        };
-        if offers.offer(command) {
-            self.section.along = other;
+        if offers.offer(Command::TurnSection) {
+            self.section.along = match self.section.along {
+                Along::RowWires => Along::ColumnWires,
+                Along::ColumnWires => Along::RowWires,
+            };
         }
     }
 }

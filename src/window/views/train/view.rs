@@ -17,7 +17,7 @@ use super::{
     surfaces::surfaces_ui,
 };
 use crate::window::{
-    job::Wake,
+    job::Jobs,
     plotting::SeriesView,
     shared::{
         Command, Effect, Holdings, NetworkSource, Offers, RightCard, RunResult, Shared, Shown, SourceKind, Status,
@@ -25,7 +25,7 @@ use crate::window::{
     },
     test_view::{Drawing, TestView},
     theme::space,
-    widgets::{card_ui, neighbours, snapshot_ui},
+    widgets::{card_ui, snapshot_ui},
 };
 
 impl View for TrainView {
@@ -40,10 +40,9 @@ impl View for TrainView {
             let results = self.decoders.measured.as_deref().unwrap_or_default();
             let measured = results.iter().filter(|result| result.report.is_some()).count();
             let progress = format!("{measured} of {} measured", counted(results.len(), "decoder"));
-            Unfinished::new("More decoders", progress)
+            Unfinished::new("Train", "More decoders", progress)
         });
         Holdings {
-            is_computing: false,
             unfinished: Vec::from_iter(unfinished),
             files: self.recording.files_in_use(),
         }
@@ -61,7 +60,6 @@ impl View for TrainView {
             Command::Train,
             Command::TrainLonger,
             Command::PauseTraining,
-            Command::ResumeTraining,
             Command::StopTraining,
         ] {
             if offers.offer(command.clone()) {
@@ -81,14 +79,9 @@ impl View for TrainView {
         {
             self.press.press_middle(skin);
         }
-        let next_to = neighbours(self.snapshot, shared.test().map_or(0, TestView::snapshots));
-        for (command, snapshot) in [Command::PreviousSample, Command::NextSample].into_iter().zip(next_to) {
-            if offers.offer_unless(
-                command,
-                snapshot.is_none().then_some("There is no other in this direction."),
-            ) {
-                self.show_snapshot(snapshot.unwrap_or(self.snapshot));
-            }
+        let snapshots = shared.test().map_or(0, TestView::snapshots);
+        if let Some(snapshot) = offers.offer_samples(self.snapshot, snapshots) {
+            self.show_snapshot(snapshot);
         }
         self.offer_charts(offers, shared);
     }
@@ -190,8 +183,8 @@ pub struct TrainView {
 }
 
 impl TrainView {
-    /// Nothing drawn yet. `wake` is called when a decoder is measured.
-    pub fn new(wake: Wake) -> Self {
+    /// Nothing drawn yet.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             snapshot: 0,
             target: 0,
@@ -203,10 +196,10 @@ impl TrainView {
             section: SectionChoice::default(),
             has_error_bars: false,
             drawn: Drawn::default(),
-            press: PressState::new(&wake),
-            scrub: ScrubState::new(Arc::clone(&wake)),
-            recording: RecordingEditor::new(&wake),
-            decoders: Decoders::new(wake, &[]),
+            press: PressState::new(jobs),
+            scrub: ScrubState::new(jobs),
+            recording: RecordingEditor::new(jobs),
+            decoders: Decoders::new(jobs, &[]),
         }
     }
 
