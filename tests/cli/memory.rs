@@ -138,7 +138,7 @@ fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
         ),
         (
             "export --network a.json --format c99 --precision fixed16 --out c".to_owned(),
-            2,
+            1,
             "no history of readings: give --precision f64 or f32",
         ),
     ] {

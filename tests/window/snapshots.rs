@@ -20,14 +20,14 @@ fn contains_a_time(text: &str) -> bool {
     words.windows(2).any(|pair| is_number(pair[0]) && is_unit(pair[1]))
 }
 
-/// Covers the line that contains a time, in the left column or right of the middle: the words after it move with its length.
+/// Covers the line that contains a time, in the left column or from its beginning on: the words after it move with its length.
 fn cover_line(picture: &mut RgbaImage, place: Rect) {
     let width = picture.width();
     let column_end = width * 27 / 100;
     let columns = if place.right() < column_end as f32 {
         0..column_end
     } else {
-        width * 45 / 100..width
+        (width * 45 / 100).min(place.left().max(0.0) as u32)..width
     };
     let bottom = (place.bottom() as u32 + 1).min(picture.height());
     for y in place.top().max(0.0) as u32..bottom {
