@@ -1,6 +1,5 @@
 //! Accessibility: names for screen readers, and everything within reach of the keyboard.
 
-use decoupler::window::Phase;
 use eframe::egui::{Event, Key, Modifiers, Rect, Shape, accesskit::Role};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
@@ -115,9 +114,7 @@ fn a_network_is_configured_and_trained_by_keys_alone() {
     assert_eq!(driver.state().draft, crate::driver::small());
     tab_to(&mut driver, "▶ Train");
     driver.press(Key::Space);
-    driver.wait("the end of the training", |driver| {
-        matches!(driver.state().phase, Phase::Ended(_))
-    });
+    driver.wait("the end of the training", |driver| driver.has_ended());
     // The results are within reach of the keyboard too.
     tab_to(&mut driver, "Regression");
     driver.press(Key::Enter);
@@ -125,7 +122,7 @@ fn a_network_is_configured_and_trained_by_keys_alone() {
     assert!(driver.says("Correlation R = "));
     tab_to(&mut driver, "Next snapshot");
     driver.press(Key::Space);
-    assert_eq!(driver.views().train.snapshot, 1);
+    assert_eq!(driver.snapshot(), 1);
     driver.act("Chart: Section");
     driver.press(Key::CloseBracket);
     assert!(driver.says("7 of 10"));

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use decoupler::window::{Effect, Phase};
+use decoupler::window::Effect;
 use decoupler_core::{
     evaluation::{Run, RunSettings},
     sensor::ArrayScale,
@@ -182,7 +182,11 @@ fn typed_numbers_are_kept_within_their_limits() {
         assert_eq!(driver.state().draft, draft, "{text} {label} are rejected");
     }
     driver.enter("Hidden nodes", "a dozen");
-    assert_eq!(driver.state().draft.hidden, 17, "words are rejected");
+    assert_eq!(
+        driver.get("Hidden nodes").value().as_deref(),
+        Some("17"),
+        "words are rejected"
+    );
     driver.settle();
 }
 
@@ -285,17 +289,11 @@ fn keys_start_a_training_and_step_through_the_snapshots() {
     driver.press(Key::PageDown);
     driver.press(Key::PageDown);
     driver.press(Key::PageUp);
-    assert_eq!(driver.views().train.snapshot, 1);
+    assert_eq!(driver.snapshot(), 1);
     assert!(driver.says("2 of 10"));
     driver.press_with(Modifiers::COMMAND, Key::Enter);
-    driver.wait("the end of the training", |driver| {
-        matches!(driver.state().phase, Phase::Ended(_))
-    });
-    assert_eq!(
-        driver.views().train.snapshot,
-        1,
-        "training keeps the displayed snapshot"
-    );
+    driver.wait("the end of the training", |driver| driver.has_ended());
+    assert_eq!(driver.snapshot(), 1, "training keeps the displayed snapshot");
     driver.settle();
 }
 

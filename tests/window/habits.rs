@@ -1,6 +1,5 @@
 //! Habits: undo and redo, the list of all actions, keyboard shortcuts, the size of the interface.
 
-use decoupler::window::Phase;
 use eframe::egui::{Key, Modifiers, vec2};
 
 use crate::{driver::Driver, training::start_endless};
@@ -43,7 +42,7 @@ fn the_settings_of_a_running_training_cannot_be_undone() {
     pause(&mut driver);
     start_endless(&mut driver);
     let held = driver.state().draft;
-    assert!(driver.state().phase.is_busy());
+    assert!(driver.is_enabled("■ Stop"));
     driver.press_with(UNDO.0, UNDO.1);
     assert_eq!(driver.state().draft, held);
     assert!(!driver.is_enabled("Undo change of settings"));
@@ -85,7 +84,32 @@ fn while_the_list_is_open_other_keys_do_nothing() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.press_with(Modifiers::COMMAND, Key::Enter);
-    assert_eq!(driver.state().phase, Phase::Idle);
+    assert!(driver.says("Ready: press Train"));
+}
+
+#[test]
+fn buttons_keys_and_the_list_agree_on_what_is_available() {
+    let listed = |driver: &mut Driver, action: &str| {
+        driver.press_with(Modifiers::COMMAND, Key::K);
+        driver.type_into("Action", action);
+        let is_enabled = driver.is_enabled(action);
+        driver.press(Key::Escape);
+        is_enabled
+    };
+    let mut driver = Driver::open();
+    assert!(!driver.is_enabled("■ Stop") && !listed(&mut driver, "Stop training"));
+    assert!(driver.is_enabled("▶ Train") && listed(&mut driver, "Open files"));
+    driver.press_with(Modifiers::COMMAND, Key::K);
+    driver.type_into("Action", "Stop training");
+    driver.get("Stop training").hover();
+    driver.wait("the reason", |driver| driver.says("No training is running."));
+    driver.press(Key::Escape);
+    start_endless(&mut driver);
+    assert!(driver.is_enabled("■ Stop") && listed(&mut driver, "Stop training"));
+    assert!(!driver.is_enabled("▶ Train") && !listed(&mut driver, "Open files"));
+    driver.press_with(Modifiers::COMMAND, Key::Period);
+    driver.wait("the end", |driver| driver.says("Stopped at epoch"));
+    assert!(!driver.is_enabled("■ Stop") && driver.is_enabled("▶ Train"));
 }
 
 #[test]
@@ -123,9 +147,7 @@ fn the_list_has_the_actions_of_every_view_and_shows_it_first() {
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.type_into("Action", "start training");
     driver.press(Key::Enter);
-    driver.wait("the end of the training", |driver| {
-        matches!(driver.state().phase, Phase::Ended(_))
-    });
+    driver.wait("the end of the training", |driver| driver.has_ended());
     assert_eq!(driver.shown(), "Train");
 }
 
@@ -139,11 +161,14 @@ fn undo_says_what_it_undid_and_shows_it() {
     driver.act("Undo change of settings");
     driver.settle();
     assert!(driver.says("Undone: hidden"), "{:#?}", driver.texts());
-    assert_eq!((driver.shown(), driver.state().draft.hidden), ("Train", 12));
+    assert_eq!(
+        (driver.shown(), driver.get("Hidden nodes").value().as_deref()),
+        ("Train", Some("12"))
+    );
     driver.act("Redo change of settings");
     driver.settle();
     assert!(driver.says("Redone: hidden"), "{:#?}", driver.texts());
-    assert_eq!(driver.state().draft.hidden, 7);
+    assert_eq!(driver.get("Hidden nodes").value().as_deref(), Some("7"));
     driver.harness().run_steps(80);
     driver.click("Best accuracy");
     driver.harness().run_steps(80);

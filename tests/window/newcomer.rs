@@ -1,6 +1,5 @@
 //! The first minute: the initial scene, the glossary, and empty views that fill on a click.
 
-use decoupler::window::Phase;
 use decoupler_core::{
     evaluation::{Run, RunSettings},
     scene::Loading,
@@ -164,7 +163,7 @@ fn about_has_the_version_and_the_licences_of_all_libraries() {
 fn the_list_of_actions_finds_train_by_other_words() {
     let mut driver = open_first();
     driver.act("start training");
-    driver.wait("the training", |driver| driver.state().phase.is_busy());
+    driver.wait("the training", |driver| driver.is_enabled("■ Stop"));
     driver.act("Stop training");
 }
 
@@ -194,9 +193,7 @@ fn empty_views_fill_on_a_click() {
     driver.click_button("Train");
     driver.settle();
     driver.click("▶ Train");
-    driver.wait("the end of the training", |driver| {
-        matches!(driver.state().phase, Phase::Ended(_))
-    });
+    driver.wait("the end of the training", |driver| driver.has_ended());
     driver.click_button("Study");
     driver.click("Table 1");
     driver.click_button("▶ Run");

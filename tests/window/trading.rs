@@ -16,7 +16,7 @@ use eframe::egui::vec2;
 use crate::{
     driver::Driver,
     experiments::wait_for_the_end,
-    sources::{Opened, open_small},
+    sources::{Opened, open_small, trained_small},
     training::endless,
 };
 
@@ -280,6 +280,33 @@ fn a_measurement_waits_while_a_training_would_distort_its_times() {
     driver.click_button("Study");
     wait_for_the_end(&mut driver);
     assert!(!driver.says("would distort the times"));
+    assert!(
+        driver.says("Speed against accuracy finished: 16 points in "),
+        "{:#?}",
+        driver.texts()
+    );
+}
+
+#[test]
+fn a_measurement_waits_for_the_work_of_another_view_and_names_it() {
+    let mut driver = trained_small(SourceKind::Array).driver;
+    driver.wait_for_kept_run();
+    driver.click_button("Study");
+    driver.click(TOPIC);
+    tiny(&mut driver);
+    driver.click_button("Live");
+    driver.click("▶ Start");
+    driver.click_button("Study");
+    driver.click("▶ Run");
+    driver.wait("the note", |driver| {
+        driver.says("Waiting: live decoding is under way and would distort the times.")
+    });
+    driver.harness().run_steps(20);
+    assert!(!driver.has("Point Ridge, paper preset"), "nothing is measured");
+    driver.click_button("Live");
+    driver.click("■ Stop");
+    driver.click_button("Study");
+    wait_for_the_end(&mut driver);
     assert!(
         driver.says("Speed against accuracy finished: 16 points in "),
         "{:#?}",

@@ -87,7 +87,7 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
 
     driver.details();
     panics(&mut driver, "comparison of decoders", |driver| {
-        driver.click("More decoders")
+        driver.click("More decoders");
     });
     driver.click("More decoders");
     driver.click("More decoders");
