@@ -85,9 +85,9 @@ fn two_runs_are_compared_and_survive_a_restart() {
         let [a, b] = shown.each_ref().map(|file| *file.scores.network.nodes().unwrap());
         for (letter, errors) in [("A", a), ("B", b)] {
             let cell = format!("Z error, %, {letter}: {}", format_number(errors.z_percent));
-            assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
+            driver.assert_has(&cell);
             let cell = format!("Worst node, mm, {letter}: {}", format_number(errors.worst_mm));
-            assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
+            driver.assert_has(&cell);
         }
         for (surface, run) in ["Surface of A", "Surface of B"].into_iter().zip(&runs) {
             assert_eq!(driver.get(surface).value(), Some(decoded_heights(run)));
@@ -103,7 +103,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     let picture = fs::read_to_string(picture).unwrap();
     for curve in ["A: Six hidden nodes, test", &format!("B: {SECOND}, training")] {
         assert!(picture.contains(curve), "{curve} is in the picture as in the window");
-        assert!(driver.has(curve), "{curve}: {:#?}", driver.texts());
+        driver.assert_has(curve);
     }
     driver.click("Next snapshot");
     assert_ne!(driver.get("Surface of A").value(), Some(decoded_heights(&runs[0])));
@@ -158,7 +158,7 @@ fn a_damaged_run_is_reported_and_the_others_are_loaded() {
     fs::write(&damaged, "{\"format\": \"decoupler netw").unwrap();
     let mut driver = Driver::open_keeping(&path);
     wait_for_file(&mut driver);
-    assert!(driver.says(&damaged.display().to_string()), "{:#?}", driver.texts());
+    driver.assert_says(&damaged.display().to_string());
     assert_eq!(kept(&driver), 1);
     driver.click("Dismiss");
     driver.click_button("Compare");
@@ -245,7 +245,7 @@ fn displayed_pictures_are_saved_in_the_format_of_their_extension() {
     driver.train();
     let at = |name: &str| folder.path().join(name);
     driver.save("Surfaces, PNG", &at("a.png"));
-    assert!(driver.says("Saved "), "{:#?}", driver.texts());
+    driver.assert_says("Saved ");
     driver.click("Dismiss");
     let tabs = ["Loss", "Histogram", "Regression", "Nodes"];
     let mut pictures = Vec::new();
@@ -271,7 +271,7 @@ fn saved_surfaces(driver: &mut Driver) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("surfaces.svg");
     driver.save("Surfaces, SVG", &path);
-    assert!(driver.says("Saved "), "{:#?}", driver.texts());
+    driver.assert_says("Saved ");
     driver.click("Dismiss");
     fs::read_to_string(path).unwrap()
 }
@@ -356,14 +356,10 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
         let errors = file.scores.network.targets()[1];
         for (name, value) in [("RMSE", errors.rmse), ("R²", errors.r2.unwrap())] {
             let cell = format!("{name} of y (mm), {letter}: {}", format_number(value));
-            assert!(driver.has(&cell), "{cell}: {:#?}", driver.texts());
+            driver.assert_has(&cell);
         }
     }
-    assert!(
-        driver.says("decoded x (mm) against actual x (mm)"),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("decoded x (mm) against actual x (mm)");
     assert!(!driver.says("not comparable"));
     let picture = folder.path().join("regression.svg");
     driver.save("Regression of A, SVG", &picture);
@@ -387,11 +383,7 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     driver.settle();
     assert!(driver.says("probe.csv") && driver.has(&format!("{name} as A")));
     let rmse = format_number(kept[0].scores.network.targets()[0].rmse);
-    assert!(
-        driver.has(&format!("RMSE of x (mm), A: {rmse}")),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_has(&format!("RMSE of x (mm), A: {rmse}"));
 }
 
 #[test]

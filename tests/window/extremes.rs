@@ -114,6 +114,9 @@ fn extreme_resistivities_and_geometries_train_or_say_why_not() {
         let mut driver = Driver::open();
         driver.configure_small();
         driver.enter("Epochs", "3");
+        driver.enter("Training samples", "60");
+        driver.enter("Validation samples", "20");
+        driver.enter("Test samples", "20");
         for (label, text) in changes {
             driver.enter(label, text);
         }

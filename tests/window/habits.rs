@@ -138,18 +138,18 @@ fn undo_says_what_it_undid_and_shows_it() {
     driver.click_button("Compare");
     driver.act("Undo change of settings");
     driver.settle();
-    assert!(driver.says("Undone: hidden"), "{:#?}", driver.texts());
+    driver.assert_says("Undone: hidden");
     assert_eq!((driver.shown(), driver.state().draft.hidden), ("Train", 12));
     driver.act("Redo change of settings");
     driver.settle();
-    assert!(driver.says("Redone: hidden"), "{:#?}", driver.texts());
+    driver.assert_says("Redone: hidden");
     assert_eq!(driver.state().draft.hidden, 7);
     driver.harness().run_steps(80);
     driver.click("Best accuracy");
     driver.harness().run_steps(80);
     driver.act("Undo change of settings");
     driver.settle();
-    assert!(driver.says("Undone: preset Best accuracy"), "{:#?}", driver.texts());
+    driver.assert_says("Undone: preset Best accuracy");
 }
 
 #[test]

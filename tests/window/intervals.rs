@@ -89,6 +89,6 @@ fn stopping_a_calibration_keeps_the_network_without_intervals() {
     driver.wait_for_kept_run();
     assert_ne!(driver.state().phase, Phase::Ended(StopReason::Stopped));
     driver.details();
-    assert!(driver.has("No 90 % intervals: interrupted."), "{:#?}", driver.texts());
+    driver.assert_has("No 90 % intervals: interrupted.");
     assert_eq!(driver.kept(0).intervals, None);
 }

@@ -86,7 +86,7 @@ fn a_damaged_file_is_reported_and_replaced() {
         fs::write(&path, text).unwrap();
         let mut driver = Driver::open_remembering(&path);
         let notice = format!("'{}' is damaged", path.display());
-        assert!(driver.says(&notice), "{:#?}", driver.texts());
+        driver.assert_says(&notice);
         driver.wait("another file", |_| fs::read_to_string(&path).unwrap().len() > 100);
         drop(driver);
         assert!(Driver::open_remembering(&path).notice().is_none());

@@ -149,7 +149,7 @@ fn a_training_with_noise_is_compared_with_the_limit_that_noise_sets() {
     assert!(model_based.z_mm > 0.0);
     let ratio = run.errors().nodes().unwrap().z_mm / model_based.z_mm;
     let said = format!("{} times the model-based error", format_number(ratio));
-    assert!(driver.says(&said), "{said}: {:#?}", driver.texts());
+    driver.assert_says(&said);
 }
 
 #[test]

@@ -11,7 +11,6 @@ use decoupler_core::{
     scene::{Noise, Scene},
 };
 use decoupler_files::{export::format_percent, figure::point_name, import::Setup};
-use eframe::egui::vec2;
 
 use crate::{
     driver::Driver,
@@ -40,7 +39,7 @@ pub(crate) fn tiny(driver: &mut Driver) {
     }
     driver.enter("Maximum samples", "100");
     driver.enter("Maximum epochs", "3");
-    assert!(driver.has("16 points"), "{:#?}", driver.texts());
+    driver.assert_has("16 points");
 }
 
 pub(crate) fn measure(driver: &mut Driver) {
@@ -111,11 +110,7 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
     let mut driver = open();
     tiny(&mut driver);
     measure(&mut driver);
-    assert!(
-        driver.says("Speed against accuracy finished: 16 points in "),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("Speed against accuracy finished: 16 points in ");
     let table = folder.path().join("points.csv");
     driver.save("All points, CSV", &table);
     driver.click("Dismiss");
@@ -148,7 +143,7 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
         "Network f32, best preset, 3 hidden",
     ] {
         let point = format!("Point {name}");
-        assert!(driver.has(&point), "{point}: {:#?}", driver.texts());
+        driver.assert_has(&point);
     }
 
     driver.click_button("0.1 %");
@@ -167,24 +162,11 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
     assert!(fastest_under(&points, 1e9).is_some());
     assert!(!driver.is_enabled(OPEN), "nothing is marked");
     driver.click(&format!("Point {}", point_name(best)));
+    assert_eq!(driver.shown(), "Study", "a click only marks");
     driver.enter("Fastest under", "1e-12");
     assert!(driver.has("No measured decoder is this accurate."));
     driver.click(OPEN);
     assert_eq!((driver.shown(), driver.state().draft), ("Train", best.settings));
-}
-
-#[test]
-fn a_marked_point_opens_its_configuration() {
-    let mut driver = open();
-    tiny(&mut driver);
-    measure(&mut driver);
-    let before = driver.state().draft;
-    driver.click("Point Newton, paper preset");
-    assert_eq!(driver.shown(), "Study", "a click only marks");
-    driver.click("Point Ridge, best preset");
-    driver.click(OPEN);
-    assert_eq!(driver.shown(), "Train");
-    assert_eq!(driver.state().draft, settings(&before, Preset::Best, 0.0));
 }
 
 #[test]
@@ -243,20 +225,12 @@ fn a_measurement_shows_its_points_as_they_arrive_and_can_be_cancelled() {
         driver.is_enabled("▶ Run"),
         "cancelling does not wait for the current point"
     );
-    assert!(
-        driver.says("Speed against accuracy ended early: "),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("Speed against accuracy ended early: ");
     // The next one begins when the processor is free, and shows only its own points.
     driver.type_into("Hidden nodes", "3");
     driver.enter("Maximum epochs", "3");
     measure(&mut driver);
-    assert!(
-        driver.says("Speed against accuracy finished: 16 points in "),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("Speed against accuracy finished: 16 points in ");
 }
 
 #[test]
@@ -280,46 +254,20 @@ fn a_measurement_waits_while_a_training_would_distort_its_times() {
     driver.click_button("Study");
     wait_for_the_end(&mut driver);
     assert!(!driver.says("would distort the times"));
-    assert!(
-        driver.says("Speed against accuracy finished: 16 points in "),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("Speed against accuracy finished: 16 points in ");
 }
 
 #[test]
 fn an_invalid_plan_says_why() {
     let mut driver = open();
     driver.type_into("Noise levels (%)", "0, much");
-    assert!(driver.says("'much' is not a number"), "{:#?}", driver.texts());
+    driver.assert_says("'much' is not a number");
     assert!(!driver.is_enabled("▶ Run"));
     driver.type_into("Noise levels (%)", "0");
     driver.type_into("Hidden nodes", "0");
-    assert!(driver.says("hidden nodes: 0 is not possible"), "{:#?}", driver.texts());
+    driver.assert_says("hidden nodes: 0 is not possible");
     driver.type_into("Hidden nodes", "3");
     assert!(driver.is_enabled("▶ Run"));
-}
-
-#[test]
-fn charts_and_form_fit_in_a_narrow_window() {
-    let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
-    driver.click("10×6");
-    driver.click_button("Study");
-    driver.click(TOPIC);
-    tiny(&mut driver);
-    measure(&mut driver);
-    driver.settle();
-    assert!(driver.get("Export").rect().max.x < 1024.0);
-    for label in ["▶ Run", "■ Cancel", "Maximum samples"] {
-        for (_, rect) in driver.places().into_iter().filter(|(text, _)| text == label) {
-            assert!(rect.max.x < 272.0, "{label}: {rect}");
-        }
-    }
-    for (text, rect) in driver.places() {
-        if text.starts_with("Point ") {
-            assert!(rect.max.x < 1024.0 && rect.min.x > 272.0, "{text}: {rect}");
-        }
-    }
 }
 
 #[test]
@@ -342,12 +290,12 @@ fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_opened() {
         driver.texts()
     );
     // Mean and ridge once, then a network in two precisions by each of two methods.
-    assert!(driver.has("6 points"), "{:#?}", driver.texts());
+    driver.assert_has("6 points");
     measure(&mut driver);
-    assert!(driver.says("finished: 6 points in "), "{:#?}", driver.texts());
+    driver.assert_says("finished: 6 points in ");
     for name in ["Ridge", "Network, lm, 3 hidden", "Network f32, br, 3 hidden"] {
         let point = format!("Point {name}");
-        assert!(driver.has(&point), "{name}: {:#?}", driver.texts());
+        driver.assert_has(&point);
     }
     let table = folder.path().join("points.csv");
     driver.save("All points, CSV", &table);
@@ -386,11 +334,7 @@ fn save(driver: &mut Driver, format: &str, path: &Path) -> serde_json::Value {
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     driver.wait("the answer", |driver| driver.notice().is_some());
-    assert!(
-        driver.says("answers of other programs agree within"),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("answers of other programs agree within");
     driver.settle();
     driver.click("Dismiss");
     serde_json::from_str(&fs::read_to_string(path.join("metadata.json")).unwrap()).unwrap()

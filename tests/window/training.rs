@@ -270,6 +270,7 @@ fn a_diverging_training_says_so_and_shows_no_infinities() {
     });
     assert!(verdict.is_some_and(|text| text.contains("learning rate to 0.01 (now 1e6)")));
     assert!(!driver.says("Train for more epochs"), "more of the same would not help");
+    assert!(!driver.has("Train longer"));
     for tab in TABS {
         driver.click(tab);
         driver.settle();
