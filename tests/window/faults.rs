@@ -43,7 +43,10 @@ const EXPORTS: [(&str, &[(&str, &str)]); 4] = [
         &[("A: Network file, JSON", "kept.json"), ("A: Report, HTML", "kept.html")],
     ),
     ("Sensor", &[("Singular values, SVG", "values.svg")]),
-    ("Study", &[("Every trial, CSV", "trials.csv"), ("Figure, PNG", "chart.png")]),
+    (
+        "Study",
+        &[("Every trial, CSV", "trials.csv"), ("Figure, PNG", "chart.png")],
+    ),
 ];
 
 /// Runs the test `name` in a process into which the faults are preloaded.

@@ -163,9 +163,7 @@ fn a_target_lit_on_a_surface_is_named() {
     driver.click("Surfaces");
     driver.settle();
     let middle = driver.get("Actual surface").rect().scale_from_center(0.5);
-    hover(&mut driver, middle, |driver| {
-        driver.views().train.lights.node.is_some()
-    });
+    hover(&mut driver, middle, |driver| driver.views().train.lights.node.is_some());
     // The tooltip names a target and its values.
     assert!(
         driver
