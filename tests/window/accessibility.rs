@@ -1,6 +1,5 @@
 //! Accessibility: names for screen readers, and everything within reach of the keyboard.
 
-use decoupler::window::Phase;
 use eframe::egui::{Event, Key, Modifiers, Rect, Shape, accesskit::Role};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
@@ -57,9 +56,7 @@ fn a_network_is_configured_and_trained_by_keys_alone() {
     assert_eq!(driver.state().draft, crate::driver::small());
     tab_to(&mut driver, "▶ Train");
     driver.press(Key::Space);
-    driver.wait("the end of the training", |driver| {
-        matches!(driver.state().phase, Phase::Ended(_))
-    });
+    driver.wait_for_end();
     // The results are within reach of the keyboard too.
     tab_to(&mut driver, "Regression");
     driver.press(Key::Enter);

@@ -75,7 +75,7 @@ fn stepped(settings: RunSettings, epochs: usize) -> Run {
 }
 
 fn ended(driver: &mut Driver) {
-    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
+    driver.wait_for_end();
     driver.settle();
 }
 

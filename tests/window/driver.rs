@@ -16,7 +16,10 @@ use decoupler_core::{
     dataset::Simulation,
     evaluation::{ErrorTable, Run, RunSettings},
 };
-use decoupler_files::export::{NetworkFile, format_number};
+use decoupler_files::{
+    export::{KeptRun, NetworkFile, format_number},
+    import::Plan,
+};
 use eframe::egui::{
     Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, ViewportCommand, ViewportEvent, ViewportId,
     accesskit::Role, vec2,
@@ -166,6 +169,21 @@ impl Driver {
     /// Returns the shared state of the window.
     pub(crate) fn state(&self) -> &Shared {
         self.window().shared()
+    }
+
+    /// Returns the simulated array of the next training.
+    pub(crate) fn simulation(&self) -> Simulation {
+        *self.state().draft.simulation().unwrap()
+    }
+
+    /// Returns the import of the next training.
+    pub(crate) fn plan(&self) -> Plan {
+        self.state().setup().unwrap().plan().unwrap().clone()
+    }
+
+    /// Returns the list of runs.
+    pub(crate) fn runs(&self) -> &[KeptRun] {
+        &self.state().runs.workspace.runs
     }
 
     /// Returns a run of the list, from memory or its file.
@@ -590,6 +608,12 @@ impl Driver {
     #[track_caller]
     pub(crate) fn train(&mut self) {
         self.click("▶ Train");
+        self.wait_for_end();
+    }
+
+    /// Waits for the end of the training.
+    #[track_caller]
+    pub(crate) fn wait_for_end(&mut self) {
         self.wait("the end of the training", |driver| {
             matches!(driver.state().phase, Phase::Ended(_))
         });

@@ -270,7 +270,7 @@ fn a_report_contains_the_displayed_errors_and_a_kept_run_is_exported_too() {
         assert!(html.contains(&format!("<td>{value}</td>")), "{cell}");
     }
     driver.click_button("Compare");
-    let name = driver.state().runs.workspace.runs[0].name.clone();
+    let name = driver.runs()[0].name.clone();
     driver.wait("the run", |driver| driver.has("Surface of A"));
     let [network, of_kept] = ["network.json", "kept.html"].map(|name| folder.path().join(name));
     driver.save("A: Network file, JSON", &network);

@@ -154,7 +154,7 @@ fn kept_runs_at_every_fault() {
     let operations = at_every_fault(&plan, 1, |fault| {
         driver.train();
         trained.set(trained.get() + 1);
-        let listed = |driver: &Driver| driver.state().runs.workspace.runs.len() == trained.get();
+        let listed = |driver: &Driver| driver.runs().len() == trained.get();
         driver.wait(fault, listed);
     });
     assert!(operations >= 6, "{operations}");
@@ -162,7 +162,7 @@ fn kept_runs_at_every_fault() {
     driver.train();
     let expected = trained.get() + 1;
     driver.wait("all runs", |driver| {
-        driver.state().runs.workspace.runs.len() == expected && driver.state().runs.unwritten == 0
+        driver.runs().len() == expected && driver.state().runs.unwritten == 0
     });
     drop(driver);
     let written = names(&runs);
@@ -176,9 +176,7 @@ fn kept_runs_at_every_fault() {
     );
     assert_eq!(files.count(), expected, "{written:?}");
     let mut driver = Driver::open_keeping(&runs);
-    driver.wait("the runs", |driver| {
-        driver.state().runs.workspace.runs.len() == expected
-    });
+    driver.wait("the runs", |driver| driver.runs().len() == expected);
     assert_eq!(driver.notice(), None);
 }
 

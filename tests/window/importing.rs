@@ -159,14 +159,14 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     let mut other = Driver::open();
     other.drop_files(&[&saved]);
     other.wait("the import", |driver| driver.state().setup().ok() == Some(file.setup()));
-    other.wait("the run", |driver| driver.state().runs.workspace.runs.len() == 1);
+    other.wait("the run", |driver| driver.runs().len() == 1);
     assert_eq!(*other.kept(0), file);
     assert!(other.has("Hidden nodes") && other.state().settings().hidden == 4);
     // Opening it again does not add another run.
     other.drop_files(&[&saved]);
     other.wait("the end", |driver| !driver.says("Reading "));
     other.settle();
-    assert_eq!(other.state().runs.workspace.runs.len(), 1);
+    assert_eq!(other.runs().len(), 1);
 
     // Its recording is moved.
     let moved = folder.path().join("elsewhere.csv");
@@ -180,7 +180,7 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     type_path(&mut without, "Find press.csv", &moved);
     without.wait("the samples", |driver| driver.has("Training: 48"));
     assert!(!without.says("is missing") && !without.says("has changed since"));
-    assert_eq!(without.state().setup().unwrap().plan().unwrap().import.data, moved);
+    assert_eq!(without.plan().import.data, moved);
 }
 
 #[test]
@@ -235,9 +235,9 @@ fn files_dropped_while_a_training_runs_change_nothing() {
     });
     assert_eq!(driver.state().phase, Phase::Training);
     driver.click("■ Stop");
-    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
+    driver.wait_for_end();
     driver.settle();
-    assert_eq!(driver.state().setup().unwrap().plan().unwrap().import.data, path);
+    assert_eq!(driver.plan().import.data, path);
     assert!(!driver.says("other.csv"));
 }
 
@@ -279,17 +279,14 @@ fn undo_restores_a_meaning() {
     pause(&mut driver);
     driver.mean("y", "unused");
     pause(&mut driver);
-    assert_eq!(driver.state().setup().unwrap().plan().unwrap().import.targets, ["x"]);
+    assert_eq!(driver.plan().import.targets, ["x"]);
     driver.press_with(egui::Modifiers::COMMAND, egui::Key::Z);
     driver.wait("the meaning", |driver| {
         let value = driver.get("Meaning of y").accesskit_node().value();
         value.as_deref() == Some("target")
     });
     driver.settle();
-    assert_eq!(
-        driver.state().setup().unwrap().plan().unwrap().import.targets,
-        ["x", "y"]
-    );
+    assert_eq!(driver.plan().import.targets, ["x", "y"]);
 }
 
 #[test]
@@ -314,16 +311,7 @@ fn row_wires_offer_a_network_for_each_and_without_them_there_is_one() {
 #[test]
 fn the_method_decides_what_is_held_out_until_the_user_does() {
     let (mut driver, _path, _folder) = opened(60);
-    let held_out = |driver: &Driver| {
-        driver
-            .state()
-            .setup()
-            .unwrap()
-            .plan()
-            .unwrap()
-            .division
-            .validation_fraction
-    };
+    let held_out = |driver: &Driver| driver.plan().division.validation_fraction;
     assert_eq!(held_out(&driver), Some(0.0));
     driver.choose_by_hand();
     crate::configuring::choose_method(&mut driver, "Levenberg-Marquardt");

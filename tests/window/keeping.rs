@@ -9,7 +9,7 @@ use decoupler_files::export::{CheckpointFile, CheckpointPlace};
 use crate::{
     driver::{Driver, PATIENCE, small},
     folders::names,
-    intervals::noisy,
+    intervals::{noisy, train_to_calibration},
     recordings::written,
     training::{endless, start_endless},
 };
@@ -162,13 +162,12 @@ fn a_damaged_checkpoint_is_reported_and_can_be_discarded() {
 fn a_training_that_ended_without_its_intervals_gets_them_when_resumed() {
     let folder = tempfile::tempdir().unwrap();
     // Its calibration takes much longer than a frame.
-    let path = written(&folder, "press.csv", &noisy(10_000));
+    let path = written(&folder, "press.csv", &noisy(20_000));
     let kept = folder.path().join("data");
     let mut driver = Driver::open_keeping_trainings(&kept);
     driver.open_recordings(&[&path]);
     driver.limit_epochs("20");
-    driver.click("▶ Train");
-    driver.wait("the calibration", |driver| driver.state().phase == Phase::Calibrating);
+    train_to_calibration(&mut driver);
     kill(driver, &kept, 1);
     let mut driver = offered_in(&kept);
     driver.click("Resume");
@@ -198,11 +197,11 @@ fn the_last_run_is_shown_after_a_restart_and_each_of_the_list_can_be_opened() {
     driver.wait("its network", |_| bundle.exists());
     driver.enter("Hidden nodes", "3");
     driver.train();
-    driver.wait("another run", |driver| driver.state().runs.workspace.runs.len() == 2);
+    driver.wait("another run", |driver| driver.runs().len() == 2);
     assert_ne!(driver.table(), table);
 
     driver.click_button("Compare");
-    let name = driver.state().runs.workspace.runs[0].name.clone();
+    let name = driver.runs()[0].name.clone();
     driver.click(&format!("Open {name}"));
     driver.wait("the first run", |driver| driver.table() == table);
     assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));

@@ -39,9 +39,7 @@ fn open(folder: &Path) -> Driver {
 
 fn train(driver: &mut Driver, runs: usize) {
     driver.train();
-    driver.wait("the run in the list", |driver| {
-        driver.state().runs.workspace.runs.len() == runs
-    });
+    driver.wait("the run in the list", |driver| driver.runs().len() == runs);
 }
 
 fn start(driver: &mut Driver) {
@@ -283,7 +281,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     driver.harness().run_steps(2);
     driver.wait("the first frame", |driver| driver.says("0.00 of "));
     assert_eq!(check(&driver, 1).0, 0);
-    let [name, other] = [0, 1].map(|run: usize| driver.state().runs.workspace.runs[run].name.clone());
+    let [name, other] = [0, 1].map(|run: usize| driver.runs()[run].name.clone());
     driver.click("Decode with");
     driver.type_into("Search runs", &name.to_uppercase());
     assert!(!driver.has(&other), "it is not among those that were searched");
@@ -311,7 +309,7 @@ fn a_run_whose_file_is_damaged_is_not_decoded_with() {
     for runs in 1..=2 {
         train(&mut driver, runs);
     }
-    let run = driver.state().runs.workspace.runs[0].clone();
+    let run = driver.runs()[0].clone();
     assert_eq!(run.file, None, "it is only in its file");
     let damaged = folder.path().join("runs").join(format!("run-{}.json", run.id));
     fs::write(&damaged, "{").unwrap();

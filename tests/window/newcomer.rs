@@ -1,6 +1,5 @@
 //! The first minute: the initial scene, the glossary, and empty views that fill on a click.
 
-use decoupler::window::Phase;
 use decoupler_core::{
     evaluation::{Run, RunSettings},
     scene::Loading,
@@ -174,9 +173,7 @@ fn empty_views_fill_on_a_click() {
     driver.click_button("Train");
     driver.settle();
     driver.click("▶ Train");
-    driver.wait("the end of the training", |driver| {
-        matches!(driver.state().phase, Phase::Ended(_))
-    });
+    driver.wait_for_end();
     driver.click_button("Study");
     driver.click("Table 1");
     driver.click_button("▶ Run");
@@ -189,12 +186,10 @@ fn compare_opens_on_the_last_two_runs() {
     let mut driver = Driver::open();
     driver.configure_small();
     for hidden in ["3", "4", "5"] {
-        let kept = driver.state().runs.workspace.runs.len();
+        let kept = driver.runs().len();
         driver.enter("Hidden nodes", hidden);
         driver.train();
-        driver.wait("the run in the list", |driver| {
-            driver.state().runs.workspace.runs.len() > kept
-        });
+        driver.wait("the run in the list", |driver| driver.runs().len() > kept);
     }
     driver.click_button("Compare");
     driver.wait("both surfaces", |driver| {

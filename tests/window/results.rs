@@ -43,6 +43,19 @@ fn targets_with_positions_are_shown_as_surfaces() {
     );
     driver.click("Surfaces");
     driver.settle();
+    // Under the pointer a target is named, with its values.
+    let middle = driver.get("Actual surface").rect().scale_from_center(0.5);
+    let is_named = (0..400).any(|step| {
+        let share = vec2((step % 20) as f32, (step / 20) as f32) / 20.0;
+        driver.harness().hover_at(middle.lerp_inside(share));
+        driver.harness().run_steps(2);
+        driver.views().train.lights.node.is_some()
+    });
+    assert!(is_named);
+    let texts = driver.texts().into_iter();
+    let mut values = texts.filter(|text| text.starts_with("actual ") && text.contains(", decoded "));
+    assert!(values.next().is_some(), "{:#?}", driver.texts());
+    driver.harness().remove_cursor();
     // The first of the last 12 samples: d1 is the lowest and d6 the highest, or the other way round.
     let of_sample = |row: f64| {
         let (u, v) = ((0.37 * row).sin(), (0.23 * row).cos());
@@ -135,44 +148,6 @@ fn without_positions_all_targets_are_shown_over_time_and_errors_over_a_position(
         ..
     } = trained_on(force);
     assert!(!driver.has("Error map"));
-}
-
-/// Moves the pointer over a place until `holds`; returns where.
-#[track_caller]
-fn hover(driver: &mut Driver, place: eframe::egui::Rect, holds: impl Fn(&Driver) -> bool) -> eframe::egui::Pos2 {
-    const STEPS: usize = 60;
-    for step in 0..STEPS * STEPS {
-        let share = vec2((step % STEPS) as f32, (step / STEPS) as f32) / STEPS as f32;
-        let at = place.lerp_inside(share);
-        driver.harness().hover_at(at);
-        driver.harness().run_steps(2);
-        if holds(driver) {
-            return at;
-        }
-    }
-    panic!("nothing is found there");
-}
-
-#[test]
-fn a_target_lit_on_a_surface_is_named() {
-    let Opened {
-        mut driver,
-        folder: _folder,
-        ..
-    } = trained_on(|folder| skin_with_positions(folder, GRID));
-    driver.click("Surfaces");
-    driver.settle();
-    let middle = driver.get("Actual surface").rect().scale_from_center(0.5);
-    hover(&mut driver, middle, |driver| driver.views().train.lights.node.is_some());
-    // The tooltip names a target and its values.
-    assert!(
-        driver
-            .texts()
-            .iter()
-            .any(|text| text.starts_with("actual ") && text.contains(", decoded ")),
-        "{:#?}",
-        driver.texts()
-    );
 }
 
 #[test]

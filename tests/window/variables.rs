@@ -13,7 +13,7 @@ use crate::{
 };
 
 fn plan(driver: &Driver) -> Plan {
-    driver.state().setup().unwrap().plan().unwrap().clone()
+    driver.plan()
 }
 
 fn meaning(driver: &Driver, column: &str) -> Option<String> {
