@@ -47,7 +47,7 @@ fn an_idle_window_draws_nothing() {
 
 #[test]
 fn buttons_react_to_the_pointer() {
-    let mut driver = Driver::open_sized(SIZES[2]);
+    let mut driver = Driver::open();
     for (button, next_theme) in [("▶ Train", "Light theme"), ("Best accuracy", "Dark theme")] {
         // Inside the edge, next to the text.
         let place = driver.get(button).rect().left_center() + vec2(3.0, 0.0);

@@ -195,14 +195,18 @@ fn compare_opens_on_the_last_two_runs() {
     driver.wait("both surfaces", |driver| {
         driver.has("Surface of A") && driver.has("Surface of B")
     });
-    let hidden = |driver: &Driver, place| driver.state().runs.pinned(place).unwrap().file.settings.hidden;
-    assert_eq!([0, 1].map(|place| hidden(&driver, place)), [4, 5]);
+    let hidden = |driver: &Driver| {
+        let pinned = [0, 1].map(|place| driver.state().runs.pinned(place));
+        pinned.map(|run| run.map(|run| run.file.settings.hidden))
+    };
+    assert_eq!(hidden(&driver), [Some(4), Some(5)]);
     // What the user chooses stays.
     driver.click("10×6_3×18 h3 lm as A");
+    driver.wait("the chosen run", |driver| hidden(driver) == [Some(3), Some(5)]);
     driver.click_button("Train");
     driver.click_button("Compare");
     driver.settle();
-    assert_eq!([0, 1].map(|place| hidden(&driver, place)), [3, 5]);
+    assert_eq!(hidden(&driver), [Some(3), Some(5)]);
 }
 
 #[test]
