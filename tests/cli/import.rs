@@ -65,17 +65,9 @@ fn a_network_is_trained_on_joined_files_and_evaluated_for_each_target() {
 }
 
 #[test]
-fn a_recipe_trains_the_same_network_and_folds_test_every_sample() {
+fn folds_test_every_sample_of_a_recipe() {
     let folder = recordings();
-    let first = json(&format!("{TRAIN} --recipe-out import.json --json"), folder.path());
-    let again = json(
-        "train --recipe import.json --hidden 6 --starts 1 --epochs 60 --json",
-        folder.path(),
-    );
-    assert_eq!(
-        (&first["targets"], &first["dropped"]),
-        (&again["targets"], &again["dropped"])
-    );
+    json(&format!("{TRAIN} --recipe-out import.json --json"), folder.path());
     let folds = json(
         "train --recipe import.json --hidden 6 --starts 1 --epochs 30 --folds 3 --json",
         folder.path(),

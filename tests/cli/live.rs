@@ -30,7 +30,7 @@ pub(crate) fn answers(network: &Path, input: &Path) -> [Vec<Vec<f64>>; 2] {
         // A clock of its own, which jumps from frame to frame of a replay.
         while let Some(due) = session.input.due(now) {
             now = due.max(now);
-            match session.next(now, Duration::from_secs(60)) {
+            match session.next(now, Duration::from_secs(600)) {
                 SessionEvent::Answer => {
                     session.count();
                     answers.push(session.last.values.clone());

@@ -12,17 +12,24 @@ use crate::{
     terminal::decoupler,
 };
 
+/// A folder with a recording, `r.csv`, of these columns.
+fn written(header: &str, rows: impl Iterator<Item = String>) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = rows.map(|row| row + "\n").collect::<String>();
+    write(folder.path(), "r.csv", format!("{header}\n{rows}"));
+    folder
+}
+
+/// 300 samples of four numbers in [-1, 1].
+fn random(seed: u64) -> impl Iterator<Item = [f64; 4]> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..300).map(move |_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
+}
+
 /// A recording of four readings, where d repeats a and e is constant: they determine x, but not y, which is noise.
 fn recording() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut text = "a,b,d,e,x (mm),y\n".to_owned();
-    for _ in 0..300 {
-        let [a, b, noise, y]: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
-        text += &format!("{a},{b},{},7,{},{y}\n", 3.0 - 2.0 * a, a + 0.3 * b + 0.05 * noise);
-    }
-    write(folder.path(), "r.csv", text);
-    folder
+    let row = |[a, b, noise, y]: [f64; 4]| format!("{a},{b},{},7,{},{y}", 3.0 - 2.0 * a, a + 0.3 * b + 0.05 * noise);
+    written("a,b,d,e,x (mm),y", random(5).map(row))
 }
 
 const INSPECT: &str = "inspect --data r.csv --inputs a,b,d,e --targets x,y";
@@ -229,14 +236,13 @@ fn a_choice_of_settings_gives_the_intervals() {
 
 #[test]
 fn the_optimism_of_a_random_split_is_reported() {
-    let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     // A target that drifts with time, so that it cannot be predicted beyond the training samples.
-    let lines = (0..200).map(|frame| {
+    let rows = (0..200).map(|frame| {
         let time = f64::from(frame) / 20.0;
-        format!("{time},{}\n", (1.3 * time).sin() + 0.02 * rng.random_range(-1.0..1.0))
+        format!("{time},{}", (1.3 * time).sin() + 0.02 * rng.random_range(-1.0..1.0))
     });
-    write(folder.path(), "r.csv", lines.collect::<String>());
+    let folder = written("c1,c2", rows);
     let arguments = "train --data r.csv --inputs c1 --targets c2 --split random --hidden 6 --epochs 40 --json";
     for folds in ["", " --folds 4"] {
         let report = json(&format!("{arguments}{folds}"), folder.path());
@@ -254,14 +260,13 @@ fn the_optimism_of_a_random_split_is_reported() {
 /// is 0.5 too low while the target rises and as much too high while it falls.
 #[test]
 fn the_hysteresis_of_decoded_values_is_reported() {
-    let folder = tempfile::tempdir().unwrap();
     let mut reading = 5.0_f64;
-    let lines = (0..2000).map(|frame| {
+    let rows = (0..2000).map(|frame| {
         let target = 5.0 + 5.0 * (std::f64::consts::TAU * f64::from(frame) / 200.0).sin();
         reading = reading.clamp(target - 0.5, target + 0.5);
-        format!("{reading},{target}\n")
+        format!("{reading},{target}")
     });
-    write(folder.path(), "r.csv", lines.collect::<String>());
+    let folder = written("c1,c2", rows);
     let arguments = "train --data r.csv --inputs c1 --targets c2 --split time --hidden 2 --epochs 30";
     let report = json(&format!("{arguments} --json"), folder.path());
     let found = &report["hysteresis"][0];
@@ -289,19 +294,16 @@ fn the_hysteresis_of_decoded_values_is_reported() {
 /// Ten presses in random order, whose readings identify the press but do not determine the target, which differs between
 /// presses.
 fn presses() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let presses: Vec<[f64; 3]> = (0..10)
         .map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
         .collect();
-    let mut text = "press,a,b,y\n".to_owned();
-    for _ in 0..300 {
+    let rows = (0..300).map(|_| {
         let press = rng.random_range(0..10);
         let [a, b, y] = presses[press].map(|value| value + 0.01 * rng.random_range(-1.0..1.0));
-        text += &format!("{press},{a},{b},{y}\n");
-    }
-    write(folder.path(), "r.csv", text);
-    folder
+        format!("{press},{a},{b},{y}")
+    });
+    written("press,a,b,y", rows)
 }
 
 const PRESSES: &str = "--data r.csv --inputs a,b --targets y --group press";
@@ -356,10 +358,8 @@ fn repeated_readings_keep_their_frequency() {
 
 /// A recording whose only press is in these of 1000 rows, of an exact force and two noisy readings.
 fn one_press(press: std::ops::Range<usize>) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    let mut text = "a,b,force\n".to_owned();
-    for row in 0..1000 {
+    let rows = (0..1000).map(|row| {
         let phase = (row as f64 - press.start as f64 + 0.5) / press.len() as f64;
         let force = if press.contains(&row) {
             5.0 * (std::f64::consts::PI * phase).sin()
@@ -367,10 +367,9 @@ fn one_press(press: std::ops::Range<usize>) -> TempDir {
             0.0
         };
         let [a, b] = [0.3 * force, force.sqrt()].map(|value| value + rng.random_range(-0.03..0.03));
-        text += &format!("{a},{b},{force}\n");
-    }
-    write(folder.path(), "r.csv", text);
-    folder
+        format!("{a},{b},{force}")
+    });
+    written("a,b,force", rows)
 }
 
 #[test]
@@ -395,15 +394,8 @@ fn a_single_press_is_learnt_wherever_it_is_and_what_its_test_lacks_is_said() {
 
 /// Three readings of which two determine the target y, at this offset.
 fn with_offset(offset: f64) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(12);
-    let mut text = "a,b,c,y\n".to_owned();
-    for _ in 0..300 {
-        let [a, b, c, noise]: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
-        text += &format!("{a},{b},{c},{}\n", offset + a - 0.5 * b + 0.2 * noise);
-    }
-    write(folder.path(), "r.csv", text);
-    folder
+    let row = |[a, b, c, noise]: [f64; 4]| format!("{a},{b},{c},{}", offset + a - 0.5 * b + 0.2 * noise);
+    written("a,b,c,y", random(12).map(row))
 }
 
 #[test]
@@ -440,15 +432,11 @@ fn a_large_offset_of_the_target_changes_no_error() {
 
 #[test]
 fn a_reading_that_equals_the_target_is_named_as_a_possible_leak() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(13);
-    let mut text = "a,b,leak,y\n".to_owned();
-    for _ in 0..300 {
-        let [a, b, noise, tiny]: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
+    let row = |[a, b, noise, tiny]: [f64; 4]| {
         let y = a + 0.3 * b + 0.05 * noise;
-        text += &format!("{a},{b},{},{y}\n", y + 1e-6 * tiny);
-    }
-    write(folder.path(), "r.csv", text);
+        format!("{a},{b},{},{y}", y + 1e-6 * tiny)
+    };
+    let folder = written("a,b,leak,y", random(13).map(row));
     for command in [
         "train --data r.csv --inputs a,b,leak --targets y --hidden 2 --epochs 10 --json",
         "train --data r.csv --inputs a,b,leak --targets y --hidden 2 --epochs 10 --folds 3 --json",

@@ -61,7 +61,7 @@ fn chosen_settings_are_disabled_show_what_was_chosen_and_are_kept_when_the_choic
     for (name, value) in &expected {
         assert_eq!(fixed(&driver, name), *value, "{name}");
     }
-    assert!(driver.says("Chosen: "), "{:#?}", driver.texts());
+    driver.assert_says("Chosen: ");
 
     driver.choose_by_hand();
     driver.wait("the recording with the chosen memory", |driver| {
@@ -96,7 +96,7 @@ fn a_given_memory_is_kept_by_the_choice() {
     assert!(driver.says("Chosen with the other settings unless it is given here"));
     driver.enter("Lags", "3");
     driver.settle();
-    assert!(driver.says("lags 3"), "{:#?}", driver.texts());
+    driver.assert_says("lags 3");
     driver.click("▶ Train");
     driver.wait_for_training();
     let run = driver.state().run.as_ref().unwrap();

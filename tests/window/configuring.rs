@@ -1,7 +1,5 @@
 //! Configuring the next training.
 
-use std::time::Instant;
-
 use decoupler::window::Effect;
 use decoupler_core::{
     evaluation::{Run, RunSettings},
@@ -12,7 +10,7 @@ use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
 use egui_kittest::kittest::NodeT as _;
 
 use crate::{
-    driver::{Driver, PATIENCE, small, table_of},
+    driver::{Driver, small, table_of},
     every_view::CONTROLS,
 };
 
@@ -34,7 +32,7 @@ fn the_window_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
         "{value}"
     );
     assert!(driver.says("1 of 10"), "100 test samples are 10 snapshots of 10 rows");
-    assert!(!driver.has("Decoded surface"));
+    assert!(!driver.has("Decoded surface") && !driver.has("Train longer"));
 }
 
 #[test]
@@ -84,7 +82,7 @@ fn presets_set_the_array_and_its_surface_follows() {
     let mut driver = Driver::open();
     for scale in ArrayScale::PRESETS {
         driver.click(&format!("{}×{}", scale.rows(), scale.nodes_per_row()));
-        assert_eq!(driver.state().draft.simulation().unwrap().sensor.scale, scale);
+        assert_eq!(driver.simulation().sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
             let drawn = driver.views().train.drawing();
@@ -98,7 +96,7 @@ fn presets_set_the_array_and_its_surface_follows() {
 fn any_array_can_be_typed_and_an_invalid_one_is_explained_and_rejected() {
     let mut driver = Driver::open();
     driver.enter("Array scale", "4x5_2x16");
-    let scale = driver.state().draft.simulation().unwrap().sensor.scale;
+    let scale = driver.simulation().sensor.scale;
     assert_eq!(scale.to_string(), "4×5_2×16");
     assert!(driver.says("4 row-wires of 5 nodes over 16 column-wires of 2 nodes"));
     assert!(
@@ -114,12 +112,8 @@ fn any_array_can_be_typed_and_an_invalid_one_is_explained_and_rejected() {
         ("4x5_2x9999", "column-wires (M4) is 9999"),
     ] {
         driver.enter("Array scale", wrong);
-        assert_eq!(
-            driver.state().draft.simulation().unwrap().sensor.scale,
-            scale,
-            "{wrong}"
-        );
-        assert!(driver.says(reason), "{wrong}: {:#?}", driver.texts());
+        assert_eq!(driver.simulation().sensor.scale, scale, "{wrong}");
+        driver.assert_says(reason);
         assert_eq!(
             driver.get("Array scale").value(),
             Some(scale.to_string()),
@@ -223,7 +217,7 @@ fn the_geometry_changes_the_surface_and_the_preset_brings_the_papers_settings_ba
         driver
             .state()
             .skin()
-            .is_some_and(|skin| skin.sensor == driver.state().draft.simulation().unwrap().sensor)
+            .is_some_and(|skin| skin.sensor == driver.simulation().sensor)
     });
     let x_mm: Vec<f64> = driver
         .views()
@@ -236,10 +230,7 @@ fn the_geometry_changes_the_surface_and_the_preset_brings_the_papers_settings_ba
         .map(|node| node.x)
         .collect();
     assert!((x_mm[10] - x_mm[0] - 2.5).abs() < 1e-12, "rows are 2.5 mm apart");
-    assert_eq!(
-        driver.state().draft.simulation().unwrap().sensor.resistivity_ohm_per_mm,
-        1e3
-    );
+    assert_eq!(driver.simulation().sensor.resistivity_ohm_per_mm, 1e3);
     assert!(
         driver.get("Actual surface").value().unwrap().contains("to 7.9")
             || driver.get("Actual surface").value().unwrap().contains("to 8")
@@ -272,7 +263,7 @@ fn changing_the_settings_hides_old_results_and_changing_them_back_restores_them(
     other.simulation_mut().unwrap().sensor.scale = ArrayScale::PRESETS[1];
     driver.window_mut().apply(Effect::Configure(Box::new(other)));
     driver.window_mut().apply(Effect::Configure(Box::new(run)));
-    driver.wait_for_frame("the other array's surface", Instant::now() + PATIENCE);
+    driver.wait_for_frame("the other array's surface");
     driver.settle();
     assert_eq!(driver.state().draft, small());
     assert_eq!(
@@ -292,7 +283,7 @@ fn keys_start_a_training_and_step_through_the_snapshots() {
     assert_eq!(driver.snapshot(), 1);
     assert!(driver.says("2 of 10"));
     driver.press_with(Modifiers::COMMAND, Key::Enter);
-    driver.wait("the end of the training", |driver| driver.has_ended());
+    driver.wait_for_end();
     assert_eq!(driver.snapshot(), 1, "training keeps the displayed snapshot");
     driver.settle();
 }

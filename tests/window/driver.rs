@@ -16,7 +16,10 @@ use decoupler_core::{
     dataset::Simulation,
     evaluation::{ErrorTable, Run, RunSettings},
 };
-use decoupler_files::export::{NetworkFile, format_number};
+use decoupler_files::{
+    export::{KeptRun, NetworkFile, format_number},
+    import::Plan,
+};
 use eframe::egui::{
     Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, ViewportCommand, ViewportEvent, ViewportId,
     accesskit::Role, vec2,
@@ -28,8 +31,8 @@ use egui_kittest::{
 
 use crate::rasterise::Rasteriser;
 
-/// Longest time to wait for something.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+/// The limit of every wait, for hangs alone: a busy machine may take long.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Parts of the configuration that are folded away at first.
 const FOLDED: [&str; 3] = ["Scene", "Samples", "Advanced"];
@@ -168,6 +171,21 @@ impl Driver {
         self.window().shared()
     }
 
+    /// Returns the simulated array of the next training.
+    pub(crate) fn simulation(&self) -> Simulation {
+        *self.state().draft.simulation().unwrap()
+    }
+
+    /// Returns the import of the next training.
+    pub(crate) fn plan(&self) -> Plan {
+        self.state().setup().unwrap().plan().unwrap().clone()
+    }
+
+    /// Returns the list of runs.
+    pub(crate) fn runs(&self) -> &[KeptRun] {
+        &self.state().runs.workspace.runs
+    }
+
     /// Returns a run of the list, from memory or its file.
     pub(crate) fn kept(&self, index: usize) -> Arc<NetworkFile> {
         let runs = &self.state().runs;
@@ -214,15 +232,19 @@ impl Driver {
                 self.harness.step();
                 return;
             }
-            self.wait_for_frame(what, latest);
+            assert!(
+                Instant::now() < latest,
+                "{what} never came; the window shows {:#?}",
+                self.texts()
+            );
+            self.wait_for_frame(what);
         }
     }
 
     /// Draws the next frame that the window asks for.
     #[track_caller]
-    pub(crate) fn wait_for_frame(&mut self, what: &str, latest: Instant) {
-        let patience = latest.saturating_duration_since(Instant::now());
-        if self.asked.recv_timeout(patience).is_err() {
+    pub(crate) fn wait_for_frame(&mut self, what: &str) {
+        if self.asked.recv_timeout(PATIENCE).is_err() {
             panic!("{what} never came; the window shows {:#?}", self.texts());
         }
         // One frame answers all earlier requests.
@@ -262,6 +284,18 @@ impl Driver {
     /// Returns true if any text contains this.
     pub(crate) fn says(&self, text: &str) -> bool {
         self.texts().iter().any(|shown| shown.contains(text))
+    }
+
+    /// Asserts that a node has exactly this label.
+    #[track_caller]
+    pub(crate) fn assert_has(&self, label: &str) {
+        assert!(self.has(label), "{label} is not among {:#?}", self.texts());
+    }
+
+    /// Asserts that a text contains this.
+    #[track_caller]
+    pub(crate) fn assert_says(&self, text: &str) {
+        assert!(self.says(text), "{text} is in none of {:#?}", self.texts());
     }
 
     /// Returns true if the control with this label is enabled.
@@ -439,7 +473,7 @@ impl Driver {
 
     /// Copies a thing in this form: "Error table, Copy as Markdown". Returns the text on the clipboard.
     #[track_caller]
-    pub(crate) fn copy(&mut self, name: &str) -> Option<String> {
+    pub(crate) fn copy(&mut self, name: &str) -> String {
         self.choose_export(name);
         self.click_and_copy("Copy")
     }
@@ -492,23 +526,22 @@ impl Driver {
 
     /// Clicks the button with this label. Returns the text that it put on the clipboard.
     #[track_caller]
-    pub(crate) fn click_and_copy(&mut self, label: &str) -> Option<String> {
+    pub(crate) fn click_and_copy(&mut self, label: &str) -> String {
         self.get(label).click();
+        self.harness.step();
         // It is copied in the background.
-        for _ in 0..200 {
-            self.harness.step();
+        loop {
             let commands = &self.harness.output().platform_output.commands;
             let copied = commands.iter().find_map(|command| match command {
                 OutputCommand::CopyText(text) => Some(text.clone()),
                 _ => None,
             });
-            if copied.is_some() {
+            if let Some(text) = copied {
                 self.harness.run_steps(2);
-                return copied;
+                return text;
             }
-            std::thread::sleep(Duration::from_millis(5));
+            self.wait_for_frame("the copied text");
         }
-        None
     }
 
     /// Presses a key.
@@ -547,21 +580,40 @@ impl Driver {
         });
     }
 
+    /// Returns true if the window sent this command in the last frame.
+    pub(crate) fn sent(&self, command: &ViewportCommand) -> bool {
+        let output = self.harness.output();
+        output.viewport_output[&ViewportId::ROOT].commands.contains(command)
+    }
+
     /// Clicks the button of the title bar; returns whether the window closes at once.
     pub(crate) fn close(&mut self) -> bool {
         let input = self.harness.input_mut();
         let events = &mut input.viewports.get_mut(&ViewportId::ROOT).unwrap().events;
         events.push(ViewportEvent::Close);
         self.harness.step();
-        let output = self.harness.output();
-        let commands = &output.viewport_output[&ViewportId::ROOT].commands;
-        !commands.contains(&ViewportCommand::CancelClose)
+        !self.sent(&ViewportCommand::CancelClose)
+    }
+
+    /// Waits until the window closes by itself.
+    #[track_caller]
+    pub(crate) fn wait_for_closing(&mut self) {
+        while !self.sent(&ViewportCommand::Close) {
+            self.wait_for_frame("closing");
+        }
+        assert!(self.close(), "the close that the window asked for is let through");
     }
 
     /// Presses Train and waits for the end.
     #[track_caller]
     pub(crate) fn train(&mut self) {
         self.click("▶ Train");
+        self.wait_for_end();
+    }
+
+    /// Waits for the end of the training.
+    #[track_caller]
+    pub(crate) fn wait_for_end(&mut self) {
         self.wait("the end of the training", Self::has_ended);
     }
 

@@ -1,5 +1,5 @@
-//! The suite over views: every view with both sources at common sizes and zooms. Each control has a name, each picture a
-//! description, no text is cut off at its side. `PICTURES=FOLDER cargo test --test window every_view` also writes a
+//! The suite over views: every view and topic with both sources at common sizes and zooms. Each control has a name, each
+//! picture a description, no text is cut off at its side, nothing lies outside of the window or on something else. `PICTURES=FOLDER cargo test --test window every_view` also writes a
 //! picture of each view at each size in both themes.
 
 use std::{
@@ -10,7 +10,7 @@ use std::{
 
 use decoupler::window::SourceKind;
 use eframe::egui::{
-    Shape, Vec2,
+    Rect, Shape, Vec2,
     accesskit::Role,
     epaint::{ClippedShape, TextShape},
     vec2,
@@ -20,11 +20,28 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 use crate::{
     driver::Driver,
     live::number,
-    sources::{BOTH, trained_small},
+    sources::{BOTH, Opened, open_small},
+    trading,
 };
 
 /// The views, as named in the top bar.
 pub(crate) const VIEWS: [&str; 5] = ["Train", "Study", "Compare", "Sensor", "Live"];
+
+/// Topics of the Study view that it does not show first.
+const TOPICS: [&str; 6] = [
+    "Table 2",
+    "Table 3",
+    "Sweep",
+    "What the readings determine",
+    "Cross-validation",
+    MEASURED,
+];
+
+/// The topic that is studied.
+const MEASURED: &str = "Speed against accuracy";
+
+/// The Train view with the columns of the recording.
+const COLUMNS: &str = "Train, columns";
 
 /// The Live view once it has decoded.
 const DECODED: &str = "Live, decoded";
@@ -71,17 +88,49 @@ pub(crate) fn show(driver: &mut Driver, view: &str) {
     driver.settle();
 }
 
+/// Shows a view or a topic in a state of its own; returns false if the source has none.
+fn show_place(opened: &mut Opened, source: SourceKind, place: &str) -> bool {
+    let driver = &mut opened.driver;
+    let is_topic = TOPICS.contains(&place);
+    let view = if is_topic { "Study" } else { place };
+    show(driver, view.split(',').next().unwrap());
+    let button = match place {
+        COLUMNS => "Columns…",
+        topic if is_topic => topic,
+        _ => "",
+    };
+    if !button.is_empty() {
+        if !driver.has(button) {
+            return false;
+        }
+        driver.click(button);
+    }
+    match (place, source) {
+        (DECODED, _) => decode(driver, source, opened.folder.path()),
+        (MEASURED, SourceKind::Array) => {
+            trading::tiny(driver);
+            trading::measure(driver);
+        }
+        _ => {}
+    }
+    driver.settle();
+    true
+}
+
 #[test]
 fn every_view_is_named_described_and_whole() {
     let mut faults = BTreeSet::new();
     for source in BOTH {
-        let mut opened = trained_small(source);
-        let driver = &mut opened.driver;
-        for view in VIEWS.into_iter().chain([DECODED]) {
-            show(driver, view.split(',').next().unwrap());
-            if view == DECODED {
-                decode(driver, source, opened.folder.path());
+        let mut opened = open_small(source);
+        opened.change(|settings| settings.starts = 2);
+        opened.driver.train();
+        opened.driver.wait_for_last_epoch();
+        opened.driver.details();
+        for view in VIEWS.into_iter().chain(TOPICS).chain([COLUMNS, DECODED]) {
+            if !show_place(&mut opened, source, view) {
+                continue;
             }
+            let driver = &mut opened.driver;
             let place = format!("{view}, {}", name_of(source));
             for tab in tabs(driver) {
                 driver.click(&tab);
@@ -97,6 +146,10 @@ fn every_view_is_named_described_and_whole() {
                 for zoom_percent in ZOOMS_PERCENT {
                     driver.harness().set_size(size * 100.0 / zoom_percent);
                     driver.settle();
+                    if zoom_percent == 100.0 {
+                        let at = |fault| format!("{place}, {size}: {fault}");
+                        faults.extend(misplaced(driver).into_iter().map(at));
+                    }
                     let cuts = cut_texts(driver)
                         .into_iter()
                         .map(|text| without_digits(&format!("{place}: {text}")));
@@ -161,10 +214,8 @@ fn unnamed(driver: &mut Driver) -> Vec<String> {
     faults
 }
 
-/// Returns the visible texts that reach past the side of what they are drawn in, or past the window.
-fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
-    let screen = driver.harness().ctx.content_rect();
-    // Tables scroll to the side.
+/// Places of the cells of tables, which scroll to the side.
+fn cells(driver: &mut Driver) -> Vec<Rect> {
     let nodes = driver.harness().root().children_recursive();
     let of_tables = nodes.filter(|node| {
         let node = node.accesskit_node();
@@ -172,7 +223,52 @@ fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
         let is_cell = matches!(node.role(), Role::Cell | Role::ColumnHeader) || is_sorting();
         is_cell && node.bounding_box().is_some()
     });
-    let cells = Vec::from_iter(of_tables.map(|node| node.rect().expand(2.0)));
+    Vec::from_iter(of_tables.map(|node| node.rect().expand(2.0)))
+}
+
+/// Returns the controls and pictures that reach past the side of the window, controls on one line that overlap, and
+/// surfaces that are too small.
+fn misplaced(driver: &mut Driver) -> Vec<String> {
+    let width = driver.harness().ctx.content_rect().width();
+    let cells = cells(driver);
+    let nodes = driver.harness().root().children_recursive();
+    let placed = nodes.filter_map(|node| {
+        let inner = node.accesskit_node();
+        inner.bounding_box()?;
+        Some((inner.role(), inner.label().unwrap_or_default(), node.rect()))
+    });
+    let is_in_table = |place: &Rect| cells.iter().any(|cell| cell.contains(place.center()));
+    let outside = placed.filter(|(_, _, place)| !is_in_table(place));
+    let (mut faults, mut controls) = (Vec::new(), Vec::new());
+    for (role, name, place) in outside {
+        let is_control = CONTROLS.contains(&role);
+        if (is_control || role == Role::Image) && (place.left() < -0.5 || place.right() > width + 0.5) {
+            faults.push(format!("{name} is outside at {place}"));
+        }
+        let is_surface = name.ends_with(" surface") && !name.starts_with("Readings");
+        if is_surface && (place.width() < 120.0 || place.height() < 90.0) {
+            faults.push(format!("{name} is only {}", place.size()));
+        }
+        if is_control {
+            controls.push((name, place));
+        }
+    }
+    for (number, (name, place)) in controls.iter().enumerate() {
+        for (other, at) in &controls[number + 1..] {
+            let is_nested = place.contains_rect(*at) || at.contains_rect(*place);
+            let is_on_its_line = (place.center().y - at.center().y).abs() < 1.0;
+            if is_on_its_line && !is_nested && place.shrink(1.0).intersects(at.shrink(1.0)) {
+                faults.push(format!("{name} at {place} and {other} at {at} overlap"));
+            }
+        }
+    }
+    faults
+}
+
+/// Returns the visible texts that reach past the side of what they are drawn in, or past the window.
+fn cut_texts(driver: &mut Driver) -> BTreeSet<String> {
+    let screen = driver.harness().ctx.content_rect();
+    let cells = cells(driver);
     let mut cuts = BTreeSet::new();
     for ClippedShape { clip_rect, shape, .. } in &driver.harness().output().shapes {
         each_text(shape, &mut |text| {

@@ -10,8 +10,6 @@ use decoupler_core::{
 };
 use decoupler_files::export::{Cell, ExperimentTable, describe_failures, describe_worse_than_mean};
 
-use eframe::egui::vec2;
-
 use crate::{
     driver::Driver,
     recordings::{opened, plan, trained},
@@ -41,7 +39,7 @@ pub(crate) fn tiny(driver: &mut Driver) -> Experiment {
     wanted.axis = Axis::integers(AxisKind::Hidden, [2, 4]);
     (wanted.seeds, wanted.base.starts) = (1, 1);
     wanted.base.training.stopping.epochs = 3;
-    assert!(driver.has("2 trainings of at most 3 epochs"), "{:#?}", driver.texts());
+    driver.assert_has("2 trainings of at most 3 epochs");
     wanted
 }
 
@@ -75,7 +73,7 @@ fn a_table_ends_with_the_librarys_own_numbers() {
     let mut driver = open();
     let experiment = tiny(&mut driver);
     run_to_the_end(&mut driver);
-    assert!(driver.says("Table 1 finished: 2 trials"), "{:#?}", driver.texts());
+    driver.assert_says("Table 1 finished: 2 trials");
     let results = by_library(&experiment);
     let table = ExperimentTable::new(&results).table();
     let mut compared = 0;
@@ -86,7 +84,7 @@ fn a_table_ends_with_the_librarys_own_numbers() {
         for (heading, text) in table.columns.iter().map(|column| column.title()).skip(1).zip(texts) {
             if !TIMES.contains(&heading.as_str()) {
                 let shown = format!("{name}, {heading}: {text}");
-                assert!(driver.has(&shown), "{shown} is not among {:#?}", driver.texts());
+                driver.assert_has(&shown);
                 compared += 1;
             }
         }
@@ -155,8 +153,8 @@ fn a_cell_of_a_cross_validation_is_trained_where_it_is_opened() {
 #[test]
 fn before_it_is_run_a_table_shows_the_published_figures() {
     let mut driver = open();
-    assert!(driver.has("12, Z % publ.: 2.28"), "{:#?}", driver.texts());
-    assert!(driver.has("12, Z % median: –"), "{:#?}", driver.texts());
+    driver.assert_has("12, Z % publ.: 2.28");
+    driver.assert_has("12, Z % median: –");
     assert!(driver.says("Our figures appear next to"));
     assert!(!driver.is_enabled(OPEN));
     driver.open_menu();
@@ -164,7 +162,7 @@ fn before_it_is_run_a_table_shows_the_published_figures() {
     driver.press(eframe::egui::Key::Escape);
     // The typed values determine what would be filled in.
     driver.type_into("Hidden nodes", "12, 99");
-    assert!(driver.has("99, Z % publ.: –"), "{:#?}", driver.texts());
+    driver.assert_has("99, Z % publ.: –");
 }
 
 #[test]
@@ -205,7 +203,7 @@ fn invalid_lists_say_why_until_they_are_fixed() {
         (" ", "there are no values for hidden nodes: give at least one"),
     ] {
         driver.type_into("Hidden nodes", list);
-        assert!(driver.has(reason), "{:#?}", driver.texts());
+        driver.assert_has(reason);
         assert!(!driver.is_enabled("▶ Run"));
     }
     driver.click("Table 3");
@@ -213,7 +211,7 @@ fn invalid_lists_say_why_until_they_are_fixed() {
     assert!(driver.says("'10x6' is not an array scale"));
     driver.click("Table 2");
     driver.enter("Folds", "500");
-    assert!(driver.says("500 folds of 100 samples"), "{:#?}", driver.texts());
+    driver.assert_says("500 folds of 100 samples");
     driver.click("Reset to the default values");
     assert!(driver.is_enabled("▶ Run"));
     driver.click("Table 1");
@@ -240,7 +238,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
         let percent = decoupler_files::export::format_number(cell.percent().median);
         let label = format!("{z}, Z % median: {percent}");
-        assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
+        driver.assert_has(&label);
     }
     driver.settle();
     for (button, name, expected) in [
@@ -272,23 +270,6 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     assert_eq!(rows, 5, "a heading and four cells");
 }
 
-#[test]
-fn the_form_stays_within_its_panel_in_a_narrow_window() {
-    let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
-    driver.click_button("Study");
-    for topic in ["Table 1", "Table 2", "Table 3", "Sweep", "Speed against accuracy"] {
-        driver.click(topic);
-        driver.settle();
-        let title = driver.get("Export").rect();
-        assert!(title.max.x < 1024.0, "{topic}: {title}");
-        for label in ["Sweep", "Cross-validation", "■ Cancel", "▶ Run", "Seeds", "Epochs"] {
-            for (_, rect) in driver.places().into_iter().filter(|(text, _)| text == label) {
-                assert!(rect.max.x < 272.0, "{topic}, {label}: {rect}");
-            }
-        }
-    }
-}
-
 /// The window writes the sweep, the terminal trains it in two parts, and the window shows the results after each.
 #[test]
 fn a_sweep_of_the_window_is_trained_by_the_terminal_and_shown_as_it_grows() {
@@ -316,11 +297,7 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_shown_as_it_grows() {
     driver.wait("the first trials", |driver| driver.says("2 trials finished"));
     train("2/2");
     driver.wait("the other trials", |driver| driver.says("4 trials finished"));
-    assert!(
-        driver.says("Sweep folder trials: 4 trials finished"),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("Sweep folder trials: 4 trials finished");
 
     // The figures are those of the files.
     for entry in fs::read_dir(home.path().join("trials")).unwrap() {
@@ -330,7 +307,7 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_shown_as_it_grows() {
         let of = |option: &str| run["options"][option].to_string();
         let z = decoupler_files::export::format_number(run["report"]["errors"]["z_percent"].as_f64());
         let shown = format!("hidden {}, seed {}, Z %: {z}", of("hidden"), of("seed"));
-        assert!(driver.has(&shown), "{shown} is not among {:#?}", driver.texts());
+        driver.assert_has(&shown);
     }
     fs::write(home.path().join("trials").join(format!("{}.json", "0".repeat(32))), "{").unwrap();
     driver.wait("the damaged file", |driver| driver.says("00000000"));
@@ -357,7 +334,7 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     for scaling in ["Min-max", "Whitening"] {
         driver.click(scaling);
     }
-    assert!(driver.says("there are no values for scaling"), "{:#?}", driver.texts());
+    driver.assert_says("there are no values for scaling");
     for scaling in ["Min-max", "Whitening"] {
         driver.click(scaling);
     }
@@ -367,7 +344,7 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     let alone = trained(&plan(&path));
     let percent = decoupler_files::export::format_number(alone.errors().percent());
     let label = format!("12, minmax, error % median: {percent}");
-    assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
+    driver.assert_has(&label);
     driver.click("Cell 12, minmax");
     driver.click(OPEN);
     wait_for_the_network(&mut driver);

@@ -14,6 +14,7 @@ use serde_json::Value;
 
 use crate::{
     driver::Driver,
+    experiments::{run_to_the_end, tiny},
     folders::names,
     live::number,
     preloaded::{Faults, KINDS, fail_at, has_failed},
@@ -21,7 +22,7 @@ use crate::{
 
 /// Exports of each view. Every kind of file and every way to its contents is among them; other names of a menu differ only
 /// in what is written.
-const EXPORTS: [(&str, &[(&str, &str)]); 5] = [
+const EXPORTS: [(&str, &[(&str, &str)]); 4] = [
     (
         "Train",
         &[
@@ -43,12 +44,8 @@ const EXPORTS: [(&str, &[(&str, &str)]); 5] = [
     ),
     ("Sensor", &[("Singular values, SVG", "values.svg")]),
     (
-        "Speed against accuracy",
-        &[("All points, CSV", "points.csv"), ("Figure, PNG", "charts.png")],
-    ),
-    (
-        "Table 1",
-        &[("Table, CSV", "table.csv"), ("Every trial, CSV", "trials.csv")],
+        "Study",
+        &[("Every trial, CSV", "trials.csv"), ("Figure, PNG", "chart.png")],
     ),
 ];
 
@@ -115,42 +112,13 @@ fn exports_at_every_fault() {
     driver.train();
     driver.wait_for_kept_run();
     for (view, exports) in EXPORTS {
-        if ["Speed against accuracy", "Table 1"].contains(&view) {
-            driver.click_button("Study");
-            driver.click(view);
-        } else {
-            driver.click_button(view);
-        }
+        driver.click_button(view);
         if view == "Sensor" {
             driver.wait("the analysis", |driver| driver.says("Condition number: "));
         }
-        if view == "Speed against accuracy" {
-            for decoder in ["Radial basis", "Fuzzy rules", "Network + Newton"] {
-                driver.click(decoder);
-            }
-            for (label, text) in [
-                ("Noise levels (%)", "0"),
-                ("Hidden nodes", "2"),
-                ("Maximum samples", "100"),
-            ] {
-                driver.type_into(label, text);
-            }
-            driver.enter("Maximum epochs", "1");
-            driver.click("▶ Run");
-            driver.wait("the end", |driver| !driver.is_enabled("■ Cancel"));
-        }
-        if view == "Table 1" {
-            for (label, text) in [
-                ("Hidden nodes", "2"),
-                ("Seeds", "1"),
-                ("Epochs", "1"),
-                ("Restarts", "1"),
-            ] {
-                driver.type_into(label, text);
-            }
-            driver.press(eframe::egui::Key::Enter);
-            driver.click("▶ Run");
-            driver.wait("the end", |driver| !driver.is_enabled("■ Cancel"));
+        if view == "Study" {
+            tiny(&mut driver);
+            run_to_the_end(&mut driver);
         }
         for (export, name) in exports {
             let path = folder.join(name);
@@ -186,7 +154,7 @@ fn kept_runs_at_every_fault() {
     let operations = at_every_fault(&plan, 1, |fault| {
         driver.train();
         trained.set(trained.get() + 1);
-        let listed = |driver: &Driver| driver.state().runs.workspace.runs.len() == trained.get();
+        let listed = |driver: &Driver| driver.runs().len() == trained.get();
         driver.wait(fault, listed);
     });
     assert!(operations >= 6, "{operations}");
@@ -194,7 +162,7 @@ fn kept_runs_at_every_fault() {
     driver.train();
     let expected = trained.get() + 1;
     driver.wait("all runs", |driver| {
-        driver.state().runs.workspace.runs.len() == expected && driver.state().runs.unwritten == 0
+        driver.runs().len() == expected && driver.state().runs.unwritten == 0
     });
     drop(driver);
     let written = names(&runs);
@@ -208,9 +176,7 @@ fn kept_runs_at_every_fault() {
     );
     assert_eq!(files.count(), expected, "{written:?}");
     let mut driver = Driver::open_keeping(&runs);
-    driver.wait("the runs", |driver| {
-        driver.state().runs.workspace.runs.len() == expected
-    });
+    driver.wait("the runs", |driver| driver.runs().len() == expected);
     assert_eq!(driver.notice(), None);
 }
 

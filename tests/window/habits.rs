@@ -49,11 +49,27 @@ fn the_settings_of_a_running_training_cannot_be_undone() {
 }
 
 #[test]
-fn the_list_finds_an_action_by_a_few_letters_and_runs_it() {
+fn the_list_finds_an_action_by_a_few_letters_or_arrows_and_runs_it() {
     let mut driver = Driver::open();
+    driver.press_with(Modifiers::COMMAND, Key::K);
+    driver.press_with(Modifiers::COMMAND, Key::Enter);
+    assert!(
+        driver.says("Ready: press Train"),
+        "while it is open, other keys do nothing"
+    );
+    driver.type_into("Action", "show");
+    driver.press(Key::ArrowDown);
+    driver.press(Key::Escape);
+    assert!(driver.shown() == "Train" && !driver.has("Show Compare"));
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.type_into("Action", "show");
     assert!(driver.has("Show Compare") && driver.has("Show Sensor"));
+    driver.press(Key::ArrowDown);
+    driver.press(Key::Enter);
+    driver.settle();
+    assert_eq!(driver.shown(), "Compare", "the second, after Study");
+    driver.click_button("Train");
+    driver.press_with(Modifiers::COMMAND, Key::K);
     driver.type_into("Action", "comp");
     assert!(driver.has("Show Compare") && !driver.has("Show Sensor"));
     driver.press(Key::Enter);
@@ -63,28 +79,14 @@ fn the_list_finds_an_action_by_a_few_letters_and_runs_it() {
 }
 
 #[test]
-fn an_arrow_selects_the_next_action_and_escape_closes_the_list() {
+fn every_listed_key_works() {
     let mut driver = Driver::open();
-    driver.press_with(Modifiers::COMMAND, Key::K);
-    driver.type_into("Action", "show");
-    driver.press(Key::ArrowDown);
+    driver.press(Key::Questionmark);
+    assert!(driver.says("Ctrl+K") && driver.says("Next test sample") && driver.says("PageDown"));
     driver.press(Key::Escape);
-    assert_eq!(driver.shown(), "Train");
-    assert!(!driver.has("Show Compare"));
-    driver.press_with(Modifiers::COMMAND, Key::K);
-    driver.type_into("Action", "show");
-    driver.press(Key::ArrowDown);
-    driver.press(Key::Enter);
-    driver.settle();
-    assert_eq!(driver.shown(), "Compare", "the second, after Study");
-}
-
-#[test]
-fn while_the_list_is_open_other_keys_do_nothing() {
-    let mut driver = Driver::open();
-    driver.press_with(Modifiers::COMMAND, Key::K);
-    driver.press_with(Modifiers::COMMAND, Key::Enter);
-    assert!(driver.says("Ready: press Train"));
+    assert!(!driver.says("PageDown"));
+    driver.press_with(Modifiers::COMMAND, Key::Num2);
+    assert_eq!(driver.shown(), "Study");
 }
 
 #[test]
@@ -108,19 +110,8 @@ fn buttons_keys_and_the_list_agree_on_what_is_available() {
     assert!(driver.is_enabled("■ Stop") && listed(&mut driver, "Stop training"));
     assert!(!driver.is_enabled("▶ Train") && !listed(&mut driver, "Open files"));
     driver.press_with(Modifiers::COMMAND, Key::Period);
-    driver.wait("the end", |driver| driver.says("Stopped at epoch"));
+    driver.wait_for_end();
     assert!(!driver.is_enabled("■ Stop") && driver.is_enabled("▶ Train"));
-}
-
-#[test]
-fn every_listed_key_works() {
-    let mut driver = Driver::open();
-    driver.press(Key::Questionmark);
-    assert!(driver.says("Ctrl+K") && driver.says("Next test sample") && driver.says("PageDown"));
-    driver.press(Key::Escape);
-    assert!(!driver.says("PageDown"));
-    driver.press_with(Modifiers::COMMAND, Key::Num2);
-    assert_eq!(driver.shown(), "Study");
 }
 
 #[test]
@@ -147,7 +138,7 @@ fn the_list_has_the_actions_of_every_view_and_shows_it_first() {
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.type_into("Action", "start training");
     driver.press(Key::Enter);
-    driver.wait("the end of the training", |driver| driver.has_ended());
+    driver.wait_for_end();
     assert_eq!(driver.shown(), "Train");
 }
 
@@ -160,21 +151,21 @@ fn undo_says_what_it_undid_and_shows_it() {
     driver.click_button("Compare");
     driver.act("Undo change of settings");
     driver.settle();
-    assert!(driver.says("Undone: hidden"), "{:#?}", driver.texts());
+    driver.assert_says("Undone: hidden");
     assert_eq!(
         (driver.shown(), driver.get("Hidden nodes").value().as_deref()),
         ("Train", Some("12"))
     );
     driver.act("Redo change of settings");
     driver.settle();
-    assert!(driver.says("Redone: hidden"), "{:#?}", driver.texts());
+    driver.assert_says("Redone: hidden");
     assert_eq!(driver.get("Hidden nodes").value().as_deref(), Some("7"));
     driver.harness().run_steps(80);
     driver.click("Best accuracy");
     driver.harness().run_steps(80);
     driver.act("Undo change of settings");
     driver.settle();
-    assert!(driver.says("Undone: preset Best accuracy"), "{:#?}", driver.texts());
+    driver.assert_says("Undone: preset Best accuracy");
 }
 
 #[test]

@@ -67,7 +67,7 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
     });
     driver.window_mut().apply(Effect::TakeSetup(Box::new(changed)));
     driver.settle();
-    assert!(driver.says("Result of the previous settings"), "{:#?}", driver.texts());
+    driver.assert_says("Result of the previous settings");
     // Findings about another recording are not shown.
     let mut other = plan.clone();
     other.import.data = plan.import.data.with_file_name("other.csv");
@@ -97,7 +97,7 @@ fn channels_of_a_recording_without_information_are_named() {
     driver.click(READINGS);
     analyse(&mut driver);
     for expected in ["u3 is 2.5 in every sample", "u2 repeats u1"] {
-        assert!(driver.says(expected), "{expected} is not among {:#?}", driver.texts());
+        driver.assert_says(expected);
     }
 }
 
@@ -129,25 +129,4 @@ fn a_cross_validation_of_a_recording_agrees_with_the_library() {
         );
     }
     assert!(driver.says("with these settings, use ridge"), "{shown:#?}");
-}
-
-#[test]
-fn an_analysis_of_a_recording_can_be_cancelled_and_closing_asks_about_it() {
-    let mut opened = open_recording(FOLDS);
-    opened.change(|settings| settings.training.stopping.epochs = 100_000);
-    let driver = &mut opened.driver;
-    driver.settle();
-    driver.click_button("▶ Run");
-    driver.wait("the trainings", |driver| driver.says("Cross-validation…"));
-    assert!(!driver.close(), "the analysis is not lost without a question");
-    driver.harness().run_steps(2);
-    assert!(
-        driver.has("Study: Cross-validation") && driver.says("5 trainings"),
-        "{:#?}",
-        driver.texts()
-    );
-    driver.click_button("Cancel");
-    driver.click_button("■ Cancel");
-    driver.settle();
-    assert!(driver.is_enabled("▶ Run"));
 }

@@ -82,11 +82,7 @@ fn the_limit_of_a_join_and_units_survive_other_files_missing_cells_and_layouts()
     driver.drop_files(&[&third]);
     driver.wait("the third file", |driver| driver.says("third.csv is joined by time"));
     driver.settle();
-    assert!(
-        driver.says("states.csv is joined by time within 0.00450"),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("states.csv is joined by time within 0.00450");
     let plan = saved_plan(&mut driver, &folder);
     let of_states = plan.import.join.iter().find(|joined| joined.file == states).unwrap();
     assert_eq!(of_states.limit, Some(0.0045));
@@ -128,7 +124,7 @@ fn sessions() -> String {
 #[test]
 fn a_split_and_its_shares_are_kept_if_a_column_is_a_group() {
     let (mut driver, _path, folder) = opened_text(&sessions());
-    assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
+    driver.assert_says("group, 20 % test");
     driver.unfold_to("Samples", "Test share");
     driver.click_button("time");
     driver.enter("Test share", "30");
@@ -137,7 +133,7 @@ fn a_split_and_its_shares_are_kept_if_a_column_is_a_group() {
     assert!(driver.says("time, 30 % test"));
     set_missing(&mut driver, "-1");
     set_layout(&mut driver, "Separator", "comma");
-    assert!(driver.says("time, 30 % test"), "{:#?}", driver.texts());
+    driver.assert_says("time, 30 % test");
     let division = saved_plan(&mut driver, &folder).division;
     assert_eq!((division.by, division.test_fraction), (SplitBy::Time, 0.3));
     assert_eq!(division.validation_fraction, Some(0.25));
@@ -192,7 +188,7 @@ fn another_test_file_replaces_the_first() {
     assert!(driver.has("Test: 20"));
     // Training samples cannot test anything.
     choose_test_file(&mut driver, &path);
-    assert!(driver.says("press.csv is trained on"), "{:#?}", driver.texts());
+    driver.assert_says("press.csv is trained on");
     assert!(driver.has("other.csv, for the test"), "the previous one stays");
 }
 
@@ -206,7 +202,7 @@ fn joined_recordings_and_their_files_for_the_test_are_opened_together() {
     });
     let mut driver = Driver::open();
     driver.open_recordings(&Vec::from_iter(files.iter().flatten().map(|path| path.as_path())));
-    assert!(driver.has("Test: 30"), "{:#?}", driver.texts());
+    driver.assert_has("Test: 30");
     driver.click("Close states_test.csv");
     driver.wait("a share for the test", |driver| driver.has("Test: 16"));
 }

@@ -111,7 +111,7 @@ fn the_sample_recording_is_trained_on_after_three_clicks() {
         ("x", "target"),
     ];
     assert_meanings(&driver, &meanings);
-    assert!(driver.has("7 inputs, 3 targets, 900 samples"), "{:#?}", driver.texts());
+    driver.assert_has("7 inputs, 3 targets, 900 samples");
     driver.limit_epochs("30");
     driver.train_recording();
     let errors = &driver.state().result().unwrap().errors;
@@ -159,14 +159,14 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     let mut other = Driver::open();
     other.drop_files(&[&saved]);
     other.wait("the import", |driver| driver.state().setup().ok() == Some(file.setup()));
-    other.wait("the run", |driver| driver.state().runs.workspace.runs.len() == 1);
+    other.wait("the run", |driver| driver.runs().len() == 1);
     assert_eq!(*other.kept(0), file);
     assert!(other.has("Hidden nodes") && other.state().settings().hidden == 4);
     // Opening it again does not add another run.
     other.drop_files(&[&saved]);
     other.wait("the end", |driver| !driver.says("Reading "));
     other.settle();
-    assert_eq!(other.state().runs.workspace.runs.len(), 1);
+    assert_eq!(other.runs().len(), 1);
 
     // Its recording is moved.
     let moved = folder.path().join("elsewhere.csv");
@@ -180,7 +180,7 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     type_path(&mut without, "Find press.csv", &moved);
     without.wait("the samples", |driver| driver.has("Training: 48"));
     assert!(!without.says("is missing") && !without.says("has changed since"));
-    assert_eq!(without.state().setup().unwrap().plan().unwrap().import.data, moved);
+    assert_eq!(without.plan().import.data, moved);
 }
 
 #[test]
@@ -223,29 +223,6 @@ fn a_changed_recording_is_reported() {
 }
 
 #[test]
-fn a_checkpoint_continues_as_if_it_had_never_stopped() {
-    let (mut driver, path, folder) = opened(60);
-    driver.limit_epochs("3");
-    driver.train_recording();
-    let saved = folder.path().join("half.checkpoint");
-    driver.save("Checkpoint, resumable", &saved);
-    let mut other = Driver::open();
-    other.drop_files(&[&saved]);
-    other.wait("the training", |driver| driver.state().result().is_some());
-    other.wait("its recording", |driver| driver.state().can_continue());
-    other.settle();
-    assert!(!other.has("Meaning of u1"), "the results are displayed");
-    other.limit_epochs("2");
-    other.click_button("Train longer");
-    other.wait("the end", |driver| {
-        let result = driver.state().result();
-        result.is_some_and(|result| result.is_idle && result.epochs_run == 5)
-    });
-    let run = trained(&plan(&path));
-    assert_eq!(other.state().result().unwrap().errors, run.errors());
-}
-
-#[test]
 fn files_dropped_while_a_training_runs_change_nothing() {
     let (mut driver, path, folder) = opened(60);
     let other = written(&folder, "other.csv", &recording(40));
@@ -258,9 +235,9 @@ fn files_dropped_while_a_training_runs_change_nothing() {
     });
     assert!(driver.is_enabled("⏸ Pause"));
     driver.click("■ Stop");
-    driver.wait("the end", |driver| driver.has_ended());
+    driver.wait_for_end();
     driver.settle();
-    assert_eq!(driver.state().setup().unwrap().plan().unwrap().import.data, path);
+    assert_eq!(driver.plan().import.data, path);
     assert!(!driver.says("other.csv"));
 }
 
@@ -291,7 +268,7 @@ fn the_recording_is_open_again_at_the_next_start() {
     drop(without);
     let mut cleared = Driver::open_remembering(&file);
     cleared.settle();
-    assert!(cleared.has("Drop recordings here"), "{:#?}", cleared.texts());
+    cleared.assert_has("Drop recordings here");
 }
 
 #[test]
@@ -302,17 +279,14 @@ fn undo_restores_a_meaning() {
     pause(&mut driver);
     driver.mean("y", "unused");
     pause(&mut driver);
-    assert_eq!(driver.state().setup().unwrap().plan().unwrap().import.targets, ["x"]);
+    assert_eq!(driver.plan().import.targets, ["x"]);
     driver.press_with(egui::Modifiers::COMMAND, egui::Key::Z);
     driver.wait("the meaning", |driver| {
         let value = driver.get("Meaning of y").accesskit_node().value();
         value.as_deref() == Some("target")
     });
     driver.settle();
-    assert_eq!(
-        driver.state().setup().unwrap().plan().unwrap().import.targets,
-        ["x", "y"]
-    );
+    assert_eq!(driver.plan().import.targets, ["x", "y"]);
 }
 
 #[test]
@@ -337,16 +311,7 @@ fn row_wires_offer_a_network_for_each_and_without_them_there_is_one() {
 #[test]
 fn the_method_decides_what_is_held_out_until_the_user_does() {
     let (mut driver, _path, _folder) = opened(60);
-    let held_out = |driver: &Driver| {
-        driver
-            .state()
-            .setup()
-            .unwrap()
-            .plan()
-            .unwrap()
-            .division
-            .validation_fraction
-    };
+    let held_out = |driver: &Driver| driver.plan().division.validation_fraction;
     assert_eq!(held_out(&driver), Some(0.0));
     driver.choose_by_hand();
     crate::configuring::choose_method(&mut driver, "Levenberg-Marquardt");
@@ -408,11 +373,7 @@ fn two_files_are_joined_by_time_and_filtered() {
         ("states.c3", "target"),
     ];
     assert_meanings(&driver, &meanings);
-    assert!(
-        driver.says("10 rows without partner, 0 of its rows unused"),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("10 rows without partner, 0 of its rows unused");
     driver.mean("states.c3", "unused");
     driver.unfold_to("Filter", "Only rows with");
     // The field keeps the focus while the text cannot be understood yet.
@@ -449,11 +410,7 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
     driver.drop_files(&[&path]);
     driver.wait("the columns", |driver| driver.has("Meaning of v"));
     driver.settle();
-    assert!(
-        driver.says("line 3, column 2: 'n.d.' is not a number"),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("line 3, column 2: 'n.d.' is not a number");
     // A column with an unreadable cell is not used by default.
     driver.wait("the samples", |driver| driver.has("Training: 4"));
     driver.mean("v", "input");
@@ -494,26 +451,11 @@ fn a_column_of_groups_divides_the_samples_by_them() {
         writeln!(text, "s{},{u},{v},{}", row / 10, u + 2.0 * v).unwrap();
     }
     let (mut driver, _path, _folder) = opened_text(&text);
-    assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
+    driver.assert_says("group, 20 % test");
     assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
     // Another group replaces it, and without one the samples are divided by time.
     driver.mean("u", "group");
     assert_meanings(&driver, &[("session", "unused")]);
     driver.mean("u", "input");
     assert!(driver.says("time, 20 % test"));
-}
-
-#[test]
-fn everything_fits_in_narrow_windows_too() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = written(&folder, "press.csv", &recording(40));
-    for size in [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)] {
-        let mut driver = Driver::open_sized(size);
-        driver.open_recordings(&[&path]);
-        driver.settle();
-        for (text, place) in driver.places() {
-            let is_beside = place.left() < -0.5 || place.right() > size.x + 0.5;
-            assert!(!is_beside, "at {size}, {text} is at {place:?}");
-        }
-    }
 }

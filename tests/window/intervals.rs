@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, path::Path};
 
-use decoupler::window::{Command, Effect};
+use decoupler::window::{Command, Effect, Phase};
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{Coverage, Intervals},
@@ -11,7 +11,7 @@ use decoupler_core::{
 use decoupler_files::export::format_number;
 use rand::{RngExt as _, SeedableRng as _, rngs::ChaCha8Rng};
 
-use crate::recordings::opened_text;
+use crate::{driver::Driver, recordings::opened_text};
 
 /// Readings of two channels and a target that they determine but for noise.
 pub(crate) fn noisy(rows: usize) -> String {
@@ -22,6 +22,14 @@ pub(crate) fn noisy(rows: usize) -> String {
         writeln!(text, "{u1},{u2},{}", u1 + 0.3 * u2 + 0.1 * noise).unwrap();
     }
     text
+}
+
+/// Trains until the frame in which the calibration begins.
+pub(crate) fn train_to_calibration(driver: &mut Driver) {
+    driver.click("▶ Train");
+    while driver.state().phase != Phase::Calibrating {
+        driver.wait_for_frame("the calibration");
+    }
 }
 
 #[test]
@@ -60,10 +68,7 @@ fn pausing_after_the_last_epoch_keeps_the_intervals() {
     // Its calibration takes much longer than a frame.
     let (mut driver, _, _folder) = opened_text(&noisy(10_000));
     driver.limit_epochs("20");
-    driver.click("▶ Train");
-    driver.wait("the calibration", |driver| {
-        driver.says("Calibrating the 90 % intervals")
-    });
+    train_to_calibration(&mut driver);
     // As if clicked before the window knew.
     driver.window_mut().apply(Effect::Do(Command::PauseTraining));
     driver.wait_for_training();
@@ -75,23 +80,18 @@ fn pausing_after_the_last_epoch_keeps_the_intervals() {
 
 #[test]
 fn stopping_a_calibration_keeps_the_network_without_intervals() {
-    // Its five trainings take seconds, and less than the minute above which none is begun on a busy machine too.
-    let (mut driver, _, _folder) = opened_text(&noisy(60_000));
-    driver.limit_epochs("300");
-    if driver.state().recording.is_auto {
-        driver.click("Choose settings automatically");
-    }
-    driver.click("▶ Train");
-    driver.wait("the calibration", |driver| {
-        driver.says("Calibrating the 90 % intervals")
-    });
-    assert!(driver.says("Calibrating the 90 % intervals"));
+    // Its five trainings take much longer than a frame, and on a busy machine too less than the minute above which none is
+    // begun.
+    let (mut driver, _, _folder) = opened_text(&noisy(20_000));
+    driver.limit_epochs("60");
+    train_to_calibration(&mut driver);
+    driver.assert_says("Calibrating the 90 % intervals");
     // As if clicked, but in this frame: on a busy machine a frame takes long.
     driver.window_mut().apply(Effect::Do(Command::StopTraining));
     driver.wait_for_training();
     driver.wait_for_kept_run();
     assert!(!driver.says("Stopped at epoch"));
     driver.details();
-    assert!(driver.has("No 90 % intervals: interrupted."), "{:#?}", driver.texts());
+    driver.assert_has("No 90 % intervals: interrupted.");
     assert_eq!(driver.kept(0).intervals, None);
 }

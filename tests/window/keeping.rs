@@ -5,10 +5,9 @@ use std::{fs, path::Path, time::Instant};
 use decoupler_files::export::{CheckpointFile, CheckpointPlace};
 
 use crate::{
-    closing::close,
     driver::{Driver, PATIENCE, small},
     folders::names,
-    intervals::noisy,
+    intervals::{noisy, train_to_calibration},
     recordings::written,
     training::{endless, start_endless},
 };
@@ -68,7 +67,7 @@ fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
 
     let mut driver = offered_in(folder);
     let offer = format!("{OFFER}10×6_3×18, which was cut short at epoch {epoch} of 1000000?");
-    assert!(driver.says(&offer), "{:#?}", driver.texts());
+    driver.assert_says(&offer);
     driver.click("Resume");
     driver.wait("its epochs", |driver| driver.epochs() > epoch);
     driver.wait_for_epochs(3);
@@ -79,7 +78,7 @@ fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
     let mut driver = offered_in(folder);
     driver.click("Resume");
     driver.wait_for_epochs(1);
-    assert!(!close(&mut driver), "it is not saved elsewhere");
+    assert!(!driver.close(), "it is not saved elsewhere");
     driver.harness().step();
     driver.click_button("Cancel");
     driver.click("■ Stop");
@@ -132,10 +131,10 @@ fn a_training_that_is_discarded_at_closing_is_not_offered() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let mut driver = training_in(folder);
-    assert!(!close(&mut driver));
+    assert!(!driver.close());
     driver.harness().step();
     driver.click_button("Close");
-    assert!(close(&mut driver));
+    assert!(driver.close());
     drop(driver);
     assert!(nothing_is_offered_in(folder));
 }
@@ -161,15 +160,12 @@ fn a_damaged_checkpoint_is_reported_and_can_be_discarded() {
 fn a_training_that_ended_without_its_intervals_gets_them_when_resumed() {
     let folder = tempfile::tempdir().unwrap();
     // Its calibration takes much longer than a frame.
-    let path = written(&folder, "press.csv", &noisy(10_000));
+    let path = written(&folder, "press.csv", &noisy(20_000));
     let kept = folder.path().join("data");
     let mut driver = Driver::open_keeping_trainings(&kept);
     driver.open_recordings(&[&path]);
     driver.limit_epochs("20");
-    driver.click("▶ Train");
-    driver.wait("the calibration", |driver| {
-        driver.says("Calibrating the 90 % intervals")
-    });
+    train_to_calibration(&mut driver);
     kill(driver, &kept, 1);
     let mut driver = offered_in(&kept);
     driver.click("Resume");
@@ -192,18 +188,18 @@ fn the_last_run_is_shown_after_a_restart_and_each_of_the_list_can_be_opened() {
 
     let mut driver = Driver::open_again(&file, &runs);
     driver.wait("the last run", |driver| driver.table() == table);
-    assert!(driver.says("Finished: "), "{:#?}", driver.texts());
+    driver.assert_says("Finished: ");
     assert!(!driver.has("Train longer"), "its state is not kept");
     let bundle = folder.path().join("network.json");
     driver.save("Network file, JSON", &bundle);
     driver.wait("its network", |_| bundle.exists());
     driver.enter("Hidden nodes", "3");
     driver.train();
-    driver.wait("another run", |driver| driver.state().runs.workspace.runs.len() == 2);
+    driver.wait("another run", |driver| driver.runs().len() == 2);
     assert_ne!(driver.table(), table);
 
     driver.click_button("Compare");
-    let name = driver.state().runs.workspace.runs[0].name.clone();
+    let name = driver.runs()[0].name.clone();
     driver.click(&format!("Open {name}"));
     driver.wait("the first run", |driver| driver.table() == table);
     assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));

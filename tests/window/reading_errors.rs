@@ -77,7 +77,7 @@ fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
     assert_eq!(nodes, count, "10 × 6");
     // Across the plot at all heights: the path crosses some points, and gaps between them.
     let mut found = Vec::new();
-    for row in 1..20 {
+    for row in (1..20).step_by(2) {
         let y = plot.top() + plot.height() * row as f32 / 20.0;
         for column in 8..36 {
             driver
@@ -88,7 +88,7 @@ fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
         }
     }
     let nodes_lit = found.iter().flatten().count();
-    assert!(nodes_lit > 10, "{nodes_lit} of {}", found.len());
+    assert!(nodes_lit > 5, "{nodes_lit} of {}", found.len());
     assert!(found.iter().flatten().all(|node| *node < nodes));
     assert!(found.contains(&None), "between the points nothing is lit");
     // From the left to the right of the plot the nodes follow each other.
@@ -196,7 +196,7 @@ fn a_right_click_copies_and_exports_what_the_view_shows() {
         .find(|cell| cell.starts_with("network, Z %"))
         .unwrap();
     driver.right_click(&cell);
-    let table = driver.click_and_copy("Copy error table").unwrap();
+    let table = driver.click_and_copy("Copy error table");
     assert!(table.lines().any(|line| line.starts_with("network\t")), "{table}");
     driver.right_click(&cell);
     driver.click("Export error table…");

@@ -49,43 +49,26 @@ fn theme_view_and_settings_are_restored_and_nothing_is_trained() {
 }
 
 #[test]
-fn the_file_of_version_0_1_0_is_read() {
+fn files_of_earlier_versions_and_other_programs_open_and_a_damaged_one_is_reported_and_replaced() {
     let (_folder, path) = file();
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    let earlier = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/tests/fixtures/version_0.1.0/data/window.json"
-    );
-    fs::copy(earlier, &path).unwrap();
-    let driver = Driver::open_remembering(&path);
-    assert_eq!(driver.state().draft.training.stopping.epochs, 1_000_000);
-    assert!(is_a_print(&RunSettings {
-        training: RunSettings::default().training,
-        ..driver.state().draft
-    }));
-    assert_eq!(driver.notice(), None);
-}
-
-#[test]
-fn a_file_of_another_program_opens_the_default_window() {
-    let (_folder, path) = file();
-    fs::create_dir_all(path.parent().unwrap()).unwrap();
-    fs::write(&path, r#"{"is_dark": "no", "view": "Rocket", "draft": {"hidden": -1}}"#).unwrap();
-    let driver = Driver::open_remembering(&path);
-    assert!(is_a_print(&driver.state().draft));
-    assert!(driver.state().look.is_dark && driver.shown() == "Train");
-    assert_eq!(driver.notice(), None);
-}
-
-#[test]
-fn a_damaged_file_is_reported_and_replaced() {
-    let (_folder, path) = file();
-    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let earlier = include_str!("../fixtures/version_0.1.0/data/window.json");
+    let other = r#"{"is_dark": "no", "view": "Rocket", "draft": {"hidden": -1}}"#;
+    let usual = RunSettings::default().training;
+    for (text, epochs) in [(earlier, 1_000_000), (other, usual.stopping.epochs)] {
+        fs::write(&path, text).unwrap();
+        let driver = Driver::open_remembering(&path);
+        let mut draft = driver.state().draft;
+        assert_eq!(draft.training.stopping.epochs, epochs);
+        draft.training = usual;
+        assert!(is_a_print(&draft) && driver.notice().is_none());
+        assert!(text == earlier || driver.state().look.is_dark && driver.shown() == "Train");
+    }
     for text in [r#"{"is_dark": false, "view": "Comp"#, "", "\u{0}"] {
         fs::write(&path, text).unwrap();
         let mut driver = Driver::open_remembering(&path);
         let notice = format!("'{}' is damaged", path.display());
-        assert!(driver.says(&notice), "{:#?}", driver.texts());
+        driver.assert_says(&notice);
         driver.wait("another file", |_| fs::read_to_string(&path).unwrap().len() > 100);
         drop(driver);
         assert!(Driver::open_remembering(&path).notice().is_none());

@@ -128,11 +128,13 @@ fn assert_same(options: &str, terminal: &Value, driver: &mut Driver, folder: &Pa
 fn check_arrays(configurations: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     write_sensors(folder.path());
+    let mut driver = Driver::open();
     for options in configurations {
         // The preset comes first, because it sets what other options change.
         let options = format!("{options} {}", if options.contains("--hidden") { "" } else { ARRAY });
         let terminal = train_in_terminal(&options, folder.path());
-        let mut driver = Driver::open();
+        // Nothing is left of the configuration before.
+        driver.click_button("Paper");
         configure(&mut driver, &options);
         if options.contains("--sensor") {
             driver.enter("Array scale", "4x3_2x9");

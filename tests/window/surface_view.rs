@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use decoupler::window::surface_view::{SurfaceView, colour_bar_ui};
-use decoupler::window::theme::{self, Theme};
+use decoupler::window::surface_view::SurfaceView;
+use decoupler::window::theme;
 use decoupler_core::surface::SurfaceMap;
+use decoupler_files::figure::SequentialMap;
 use decoupler_files::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
-use decoupler_files::figure::{Figure, SequentialMap};
 use eframe::egui::{self, Key, Modifiers, Vec2, vec2};
 use egui_kittest::{
     Harness,
@@ -49,22 +49,6 @@ impl Skin {
         })
     }
 
-    /// A dent of a tenth of the stroke on a sensor that is level otherwise.
-    fn lightly_pressed(rows: usize, per_row: usize) -> Self {
-        Self::new(rows, per_row, |x, y, _| {
-            5.0 - 0.1 * (-((x - 0.3).powi(2) + (y - 0.4).powi(2)) / 0.03).exp()
-        })
-    }
-
-    /// Nodes that move sideways as well, some beyond the edge of the axes.
-    fn sideways(rows: usize, per_row: usize) -> Self {
-        let mut skin = Self::pressed(rows, per_row);
-        for (index, node) in Arc::make_mut(&mut skin.nodes).iter_mut().enumerate() {
-            *node += DVec3::new((1.3 * index as f64).sin(), (2.1 * index as f64).cos(), 0.0) * 0.8;
-        }
-        skin
-    }
-
     fn surface(&self, title: &str, quantity: Quantity, mode: ViewMode) -> Surface {
         let range = match quantity {
             Quantity::Height => 4.0..=5.0,
@@ -98,10 +82,6 @@ fn view<'a>(surface: &'a Surface, figure: &'a SurfaceFigure) -> SurfaceView<'a> 
         figure,
         is_touched: false,
     }
-}
-
-fn theme_of(is_dark: bool) -> &'static Theme {
-    Theme::get(is_dark)
 }
 
 fn harness<'a>(size: Vec2, is_dark: bool, app: impl FnMut(&mut egui::Ui) + 'a) -> Harness<'a> {
@@ -204,111 +184,4 @@ fn nothing_is_repainted_while_nothing_changes() {
         view(&surface, &SurfaceFigure::default()).show(ui);
     });
     assert!(harness.run() <= 2);
-}
-
-/// Pictures to look at, on screen and in print: `cargo test --test window gallery -- --ignored`, then open
-/// `target/gallery`.
-#[test]
-#[ignore = "writes pictures"]
-fn gallery() {
-    std::fs::create_dir_all("target/gallery").unwrap();
-    let turned = OrbitCamera::default().dragged(-120.0, 25.0);
-    let near = turned.zoomed(1.8).panned(0.1, 0.0);
-    for (name, figure) in [
-        (
-            "actual-decoupled",
-            shown(&Skin::pressed(10, 10), None, OrbitCamera::default()),
-        ),
-        ("actual-error-turned", shown(&Skin::pressed(10, 6), Some(23), turned)),
-        ("zoomed", shown(&Skin::pressed(10, 10), Some(45), near)),
-        (
-            "light-load",
-            shown(&Skin::lightly_pressed(10, 10), None, OrbitCamera::default()),
-        ),
-        ("sideways", shown(&Skin::sideways(10, 10), None, OrbitCamera::default())),
-        ("row", shown(&Skin::pressed(1, 10), None, OrbitCamera::default())),
-        (
-            "2x2",
-            shown(&Skin::new(2, 2, |_, _, _| 4.7), None, OrbitCamera::default()),
-        ),
-        ("1x1", shown(&Skin::pressed(1, 1), None, OrbitCamera::default())),
-        ("40x40", shown(&Skin::pressed(40, 40), None, OrbitCamera::default())),
-    ] {
-        for (mode, mode_name) in [(ViewMode::ThreeD, "3d"), (ViewMode::Top, "top")] {
-            let mut figure = figure.clone();
-            figure.surfaces.iter_mut().for_each(|surface| surface.mode = mode);
-            let path = |renderer: &str| format!("target/gallery/{name}-{mode_name}-{renderer}.png");
-            Figure::from(figure.clone())
-                .draw()
-                .save(path("print").as_ref())
-                .unwrap();
-            for is_dark in [true, false] {
-                let theme = theme_of(is_dark);
-                let mut harness = harness(vec2(860.0, 360.0), is_dark, |ui| {
-                    let filled = egui::Frame::new().fill(theme.palette.panel);
-                    filled.show(ui, |ui| show_figure(ui, &figure));
-                });
-                harness.run();
-                let renderer = if is_dark { "dark" } else { "light" };
-                harness.render().unwrap().save(path(renderer)).unwrap();
-            }
-        }
-    }
-}
-
-/// A skin and a possible result of a network; its error if a node is marked.
-fn shown(skin: &Skin, marked_node: Option<usize>, camera: OrbitCamera) -> SurfaceFigure {
-    let actual = skin.surface("Actual", Quantity::Height, ViewMode::ThreeD);
-    let numbered = skin.nodes.iter().enumerate();
-    let errors = numbered.map(|(index, node)| node.with_z(0.2 * (0.7 * index as f64).sin() * (6.0 - node.z)));
-    let errors: Arc<[DVec3]> = errors.collect();
-    let values = |nodes: &[DVec3]| {
-        skin.map
-            .evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>())
-            .into()
-    };
-    let right = if marked_node.is_some() {
-        Surface {
-            title: "Error".to_owned(),
-            values: values(&errors),
-            nodes: errors,
-            quantity: Quantity::Error,
-            range: -0.4..=0.4,
-            ..actual.clone()
-        }
-    } else {
-        let pairs = skin.nodes.iter().zip(&*errors);
-        let nodes: Arc<[DVec3]> = pairs.map(|(node, error)| node.with_z(node.z + error.z)).collect();
-        Surface {
-            title: "Decoupled".to_owned(),
-            values: values(&nodes),
-            nodes,
-            ..actual.clone()
-        }
-    };
-    SurfaceFigure {
-        surfaces: vec![actual, right],
-        camera,
-        marked_node,
-        ..SurfaceFigure::default()
-    }
-}
-
-fn show_figure(ui: &mut egui::Ui, figure: &SurfaceFigure) {
-    ui.spacing_mut().item_spacing = Vec2::ZERO;
-    ui.horizontal_top(|ui| {
-        for surface in &figure.surfaces {
-            ui.allocate_ui(vec2(350.0, 350.0), |ui| {
-                let label = surface.title.as_str();
-                SurfaceView {
-                    label,
-                    ..view(surface, figure)
-                }
-                .show(ui);
-            });
-        }
-        for scale in &figure.scales() {
-            colour_bar_ui(ui, scale, 300.0);
-        }
-    });
 }

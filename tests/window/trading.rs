@@ -11,7 +11,6 @@ use decoupler_core::{
     scene::{Noise, Scene},
 };
 use decoupler_files::{export::format_percent, figure::point_name, import::Setup};
-use eframe::egui::vec2;
 
 use crate::{
     driver::Driver,
@@ -40,7 +39,7 @@ pub(crate) fn tiny(driver: &mut Driver) {
     }
     driver.enter("Maximum samples", "100");
     driver.enter("Maximum epochs", "3");
-    assert!(driver.has("16 points"), "{:#?}", driver.texts());
+    driver.assert_has("16 points");
 }
 
 pub(crate) fn measure(driver: &mut Driver) {
@@ -111,15 +110,31 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
     let mut driver = open();
     tiny(&mut driver);
     measure(&mut driver);
-    assert!(
-        driver.says("Speed against accuracy finished: 16 points in "),
-        "{:#?}",
-        driver.texts()
-    );
-    let table = folder.path().join("points.csv");
-    driver.save("All points, CSV", &table);
-    driver.click("Dismiss");
-    let table = fs::read_to_string(table).unwrap();
+    driver.assert_says("Speed against accuracy finished: 16 points in ");
+    for (button, name, expected) in [
+        ("All points, CSV", "points.csv", &b"noise,preset,decoder"[..]),
+        ("Table, CSV", "table.csv", b"decoder,z_percent"),
+        ("Figure, SVG", "charts.svg", b"<svg"),
+        ("Figure, PNG", "charts.png", b"\x89PNG"),
+    ] {
+        let path = folder.path().join(name);
+        driver.save(button, &path);
+        driver.click("Dismiss");
+        assert!(fs::read(&path).unwrap().starts_with(expected), "{name}");
+    }
+    let table = fs::read_to_string(folder.path().join("points.csv")).unwrap();
+    let columns = |line: &str| line.split(',').count();
+    let heading = columns(table.lines().next().unwrap());
+    assert!(table.lines().all(|line| columns(line) == heading), "{table}");
+    let svg = fs::read_to_string(folder.path().join("charts.svg")).unwrap();
+    for text in [
+        "diamonds: best preset",
+        "time to decode a frame (µs)",
+        "training time (s)",
+        "Z error (%)",
+    ] {
+        assert!(svg.contains(text), "{text}");
+    }
     let mut lines = table.lines().skip(1);
     let draft = driver.state().draft;
     for noise in [0.0, 1e-3] {
@@ -148,7 +163,7 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
         "Network f32, best preset, 3 hidden",
     ] {
         let point = format!("Point {name}");
-        assert!(driver.has(&point), "{point}: {:#?}", driver.texts());
+        driver.assert_has(&point);
     }
 
     driver.click_button("0.1 %");
@@ -167,61 +182,11 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
     assert!(fastest_under(&points, 1e9).is_some());
     assert!(!driver.is_enabled(OPEN), "nothing is marked");
     driver.click(&format!("Point {}", point_name(best)));
+    assert_eq!(driver.shown(), "Study", "a click only marks");
     driver.enter("Fastest under", "1e-12");
     assert!(driver.has("No measured decoder is this accurate."));
     driver.click(OPEN);
     assert_eq!((driver.shown(), driver.state().draft), ("Train", best.settings));
-}
-
-#[test]
-fn a_marked_point_opens_its_configuration() {
-    let mut driver = open();
-    tiny(&mut driver);
-    measure(&mut driver);
-    let before = driver.state().draft;
-    driver.click("Point Newton, paper preset");
-    assert_eq!(driver.shown(), "Study", "a click only marks");
-    driver.click("Point Ridge, best preset");
-    driver.click(OPEN);
-    assert_eq!(driver.shown(), "Train");
-    assert_eq!(driver.state().draft, settings(&before, Preset::Best, 0.0));
-}
-
-#[test]
-fn measurements_are_saved_as_tables_and_figures() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut driver = open();
-    tiny(&mut driver);
-    measure(&mut driver);
-    let saved = [
-        ("All points, CSV", "points.csv", &b"noise,preset,decoder"[..]),
-        ("Table, CSV", "table.csv", b"decoder,z_percent"),
-        ("Figure, SVG", "charts.svg", b"<svg"),
-        ("Figure, PNG", "charts.png", b"\x89PNG"),
-    ];
-    for (button, name, expected) in saved {
-        let path = folder.path().join(name);
-        driver.save(button, &path);
-        assert!(driver.says("Saved "));
-        driver.click("Dismiss");
-        assert!(fs::read(&path).unwrap().starts_with(expected), "{name}");
-    }
-    let table = fs::read_to_string(folder.path().join("points.csv")).unwrap();
-    assert_eq!(table.lines().count(), 1 + 16);
-    let columns = |line: &str| line.split(',').count();
-    let heading = columns(table.lines().next().unwrap());
-    assert!(table.lines().all(|line| columns(line) == heading), "{table}");
-    let svg = fs::read_to_string(folder.path().join("charts.svg")).unwrap();
-    for text in [
-        ">Newton<",
-        "diamonds: best preset",
-        "hollow: 32 bits",
-        "time to decode a frame (µs)",
-        "training time (s)",
-        "Z error (%)",
-    ] {
-        assert!(svg.contains(text), "{text}");
-    }
 }
 
 #[test]
@@ -243,20 +208,12 @@ fn a_measurement_shows_its_points_as_they_arrive_and_can_be_cancelled() {
         driver.is_enabled("▶ Run"),
         "cancelling does not wait for the current point"
     );
-    assert!(
-        driver.says("Speed against accuracy ended early: "),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("Speed against accuracy ended early: ");
     // The next one begins when the processor is free, and shows only its own points.
     driver.type_into("Hidden nodes", "3");
     driver.enter("Maximum epochs", "3");
     measure(&mut driver);
-    assert!(
-        driver.says("Speed against accuracy finished: 16 points in "),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("Speed against accuracy finished: 16 points in ");
 }
 
 #[test]
@@ -280,11 +237,7 @@ fn a_measurement_waits_while_a_training_would_distort_its_times() {
     driver.click_button("Study");
     wait_for_the_end(&mut driver);
     assert!(!driver.says("would distort the times"));
-    assert!(
-        driver.says("Speed against accuracy finished: 16 points in "),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("Speed against accuracy finished: 16 points in ");
 }
 
 #[test]
@@ -318,35 +271,13 @@ fn a_measurement_waits_for_the_work_of_another_view_and_names_it() {
 fn an_invalid_plan_says_why() {
     let mut driver = open();
     driver.type_into("Noise levels (%)", "0, much");
-    assert!(driver.says("'much' is not a number"), "{:#?}", driver.texts());
+    driver.assert_says("'much' is not a number");
     assert!(!driver.is_enabled("▶ Run"));
     driver.type_into("Noise levels (%)", "0");
     driver.type_into("Hidden nodes", "0");
-    assert!(driver.says("hidden nodes: 0 is not possible"), "{:#?}", driver.texts());
+    driver.assert_says("hidden nodes: 0 is not possible");
     driver.type_into("Hidden nodes", "3");
     assert!(driver.is_enabled("▶ Run"));
-}
-
-#[test]
-fn charts_and_form_fit_in_a_narrow_window() {
-    let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
-    driver.click("10×6");
-    driver.click_button("Study");
-    driver.click(TOPIC);
-    tiny(&mut driver);
-    measure(&mut driver);
-    driver.settle();
-    assert!(driver.get("Export").rect().max.x < 1024.0);
-    for label in ["▶ Run", "■ Cancel", "Maximum samples"] {
-        for (_, rect) in driver.places().into_iter().filter(|(text, _)| text == label) {
-            assert!(rect.max.x < 272.0, "{label}: {rect}");
-        }
-    }
-    for (text, rect) in driver.places() {
-        if text.starts_with("Point ") {
-            assert!(rect.max.x < 1024.0 && rect.min.x > 272.0, "{text}: {rect}");
-        }
-    }
 }
 
 #[test]
@@ -369,12 +300,12 @@ fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_opened() {
         driver.texts()
     );
     // Mean and ridge once, then a network in two precisions by each of two methods.
-    assert!(driver.has("6 points"), "{:#?}", driver.texts());
+    driver.assert_has("6 points");
     measure(&mut driver);
-    assert!(driver.says("finished: 6 points in "), "{:#?}", driver.texts());
+    driver.assert_says("finished: 6 points in ");
     for name in ["Ridge", "Network, lm, 3 hidden", "Network f32, br, 3 hidden"] {
         let point = format!("Point {name}");
-        assert!(driver.has(&point), "{name}: {:#?}", driver.texts());
+        driver.assert_has(&point);
     }
     let table = folder.path().join("points.csv");
     driver.save("All points, CSV", &table);
@@ -413,11 +344,7 @@ fn save(driver: &mut Driver, format: &str, path: &Path) -> serde_json::Value {
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     driver.wait("the answer", |driver| driver.notice().is_some());
-    assert!(
-        driver.says("answers of other programs agree within"),
-        "{:#?}",
-        driver.texts()
-    );
+    driver.assert_says("answers of other programs agree within");
     driver.settle();
     driver.click("Dismiss");
     serde_json::from_str(&fs::read_to_string(path.join("metadata.json")).unwrap()).unwrap()

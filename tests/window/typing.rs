@@ -9,25 +9,13 @@ use crate::driver::Driver;
 fn values_are_accepted_with_their_units() {
     let mut driver = Driver::open();
     driver.enter("Height", "0.6 cm");
-    assert_eq!(
-        driver.state().draft.simulation().unwrap().sensor.geometry.height_mm,
-        6.0
-    );
+    assert_eq!(driver.simulation().sensor.geometry.height_mm, 6.0);
     driver.enter("Row pitch", "1500um");
-    assert_eq!(
-        driver.state().draft.simulation().unwrap().sensor.geometry.row_pitch_mm,
-        1.5
-    );
+    assert_eq!(driver.simulation().sensor.geometry.row_pitch_mm, 1.5);
     driver.enter("Largest compression", "15%");
-    assert_eq!(
-        driver.state().draft.simulation().unwrap().scene.largest_compression,
-        0.15
-    );
+    assert_eq!(driver.simulation().scene.largest_compression, 0.15);
     driver.enter("Resistivity", "2 kohm/mm");
-    assert_eq!(
-        driver.state().draft.simulation().unwrap().sensor.resistivity_ohm_per_mm,
-        2000.0
-    );
+    assert_eq!(driver.simulation().sensor.resistivity_ohm_per_mm, 2000.0);
     driver.enter("Smallest gradient", "1e-9");
     assert_eq!(driver.state().draft.training.stopping.min_gradient, 1e-9);
 }
@@ -74,10 +62,7 @@ fn a_notice_above_a_field_does_not_interrupt_typing() {
     driver.type_into("Training samples", "300");
     // The notes on this scene appear above the field during typing.
     driver.wait("the scene's outlook", |driver| {
-        let (preview, draft) = (
-            driver.state().preview.as_ref(),
-            driver.state().draft.simulation().unwrap(),
-        );
+        let (preview, draft) = (driver.state().preview.as_ref(), driver.simulation());
         preview.is_some_and(|preview| {
             let source = preview.settings.simulation().unwrap();
             (source.sensor, source.scene) == (draft.sensor, draft.scene)
@@ -85,7 +70,7 @@ fn a_notice_above_a_field_does_not_interrupt_typing() {
         })
     });
     driver.press(Key::Enter);
-    assert_eq!(driver.state().draft.simulation().unwrap().samples, 300);
+    assert_eq!(driver.simulation().samples, 300);
 }
 
 #[test]

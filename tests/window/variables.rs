@@ -13,7 +13,7 @@ use crate::{
 };
 
 fn plan(driver: &Driver) -> Plan {
-    driver.state().setup().unwrap().plan().unwrap().clone()
+    driver.plan()
 }
 
 fn meaning(driver: &Driver, column: &str) -> Option<String> {
@@ -43,7 +43,7 @@ fn columns_are_computed_from_others_and_wrong_expressions_are_refused_with_the_r
 
     driver.click_button("Columns…");
     driver.enter("Expressions", "d=u1");
-    assert!(driver.says("it has neither - nor /"), "{:#?}", driver.texts());
+    driver.assert_says("it has neither - nor /");
     driver.enter("Expressions", "d=u1-v");
     driver.wait("the refusal", |driver| {
         driver.says("there is no column 'v' in the same file")
@@ -95,7 +95,7 @@ fn variables_are_listed_with_their_shapes_and_chosen_by_name() {
     driver.open_recordings(&[&path]);
     driver.settle();
     for shape in ["120 × 3", "50 × 2", "50 × 1"] {
-        assert!(driver.says(shape), "{shape}: {:#?}", driver.texts());
+        driver.assert_says(shape);
     }
     assert!(!driver.has("Meaning of gauge.c1"));
     driver.mean("variable skin", "target");
@@ -140,13 +140,13 @@ fn several_files_with_the_same_columns_are_appended_and_each_is_a_group() {
     let mut driver = Driver::open();
     driver.open_recordings(&Vec::from_iter(paths.iter().map(|path| path.as_path())));
     driver.settle();
-    assert!(driver.has("press_4.csv, appended"), "{:#?}", driver.texts());
+    driver.assert_has("press_4.csv, appended");
     let plan_of_all = plan(&driver);
     assert_eq!(
         (plan_of_all.import.append.len(), plan_of_all.division.by),
         (4, SplitBy::Group)
     );
-    assert!(driver.says("250 samples"), "{:#?}", driver.texts());
+    driver.assert_says("250 samples");
     driver.limit_epochs("3");
     driver.train_recording();
     // One more file joins them, and one is closed.

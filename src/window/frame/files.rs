@@ -399,7 +399,7 @@ mod tests {
         assert_eq!(files.paths().count(), 3);
         let mut written = Vec::new();
         while written.len() < 3 {
-            wakes.recv_timeout(Duration::from_secs(60)).unwrap();
+            wakes.recv_timeout(Duration::from_secs(600)).unwrap();
             written.extend(std::iter::from_fn(|| files.next_written()));
         }
         assert_eq!(files.paths().count(), 0);
@@ -442,7 +442,7 @@ mod tests {
                 fs::write(path, "new").map(|()| String::new())
             });
             let (_, written) = loop {
-                wakes.recv_timeout(Duration::from_secs(60)).unwrap();
+                wakes.recv_timeout(Duration::from_secs(600)).unwrap();
                 if let Some(written) = files.next_written() {
                     break written;
                 }

@@ -59,7 +59,7 @@ impl Opened {
             if holds(&self.window) {
                 return;
             }
-            let event = self.woken.recv_timeout(Duration::from_secs(60));
+            let event = self.woken.recv_timeout(Duration::from_secs(600));
             assert!(event.is_ok(), "it never came: {:?}", self.window.shared);
         }
     }

@@ -10,7 +10,7 @@ use std::{
 use super::{Background, JobError, Jobs, Report};
 
 /// Timeout, far longer than any test takes.
-const LONG: Duration = Duration::from_secs(60);
+const LONG: Duration = Duration::from_secs(600);
 
 #[derive(Debug, PartialEq)]
 enum Event {

@@ -242,7 +242,7 @@ mod tests {
     }
 
     fn wait(woken: &Receiver<()>) {
-        woken.recv_timeout(Duration::from_secs(60)).unwrap();
+        woken.recv_timeout(Duration::from_secs(600)).unwrap();
     }
 
     #[test]

@@ -1,35 +1,13 @@
-//! A training that is continued with another method or other rules; damaged states.
+//! Damaged states of a training.
 
-use decoupler_core::training::{
-    Method, StopReason, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings,
-};
+use decoupler_core::training::{Method, Trainer, TrainerState, TrainingError};
 
-use crate::problems::{problem, start, trainer};
+use crate::problems::{problem, trainer};
 
 fn run(trainer: &mut Trainer, epochs: usize) {
     (0..epochs).for_each(|_| {
         trainer.step();
     });
-}
-
-#[test]
-fn more_epochs_continue_a_finished_training() {
-    let few = StoppingRules {
-        epochs: 3,
-        ..StoppingRules::default()
-    };
-    let settings = TrainingSettings {
-        method: Method::default(),
-        stopping: few,
-    };
-    let mut trainer = Trainer::new(start(), problem(), settings).unwrap();
-    run(&mut trainer, 5);
-    assert_eq!(trainer.stop_reason(), Some(StopReason::EpochsReached));
-    trainer.continue_with(Method::default()).unwrap();
-    assert_eq!(trainer.stop_reason(), Some(StopReason::EpochsReached));
-    trainer.set_stopping(StoppingRules { epochs: 4, ..few }).unwrap();
-    assert_eq!(trainer.step(), Some(StopReason::EpochsReached));
-    assert_eq!(trainer.latest().epoch, 4);
 }
 
 #[test]

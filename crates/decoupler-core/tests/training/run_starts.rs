@@ -101,17 +101,6 @@ fn the_start_with_the_lowest_validation_error_is_best() {
 }
 
 #[test]
-fn threads_change_no_bit() {
-    let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| bits(&trained(settings(5))))
-    };
-    let one = on(1);
-    assert_eq!(on(2), one);
-    assert_eq!(on(3), one);
-}
-
-#[test]
 fn pauses_and_restored_states_change_no_bit() {
     for method in Method::all() {
         let mut settings = settings(3);

@@ -306,7 +306,7 @@ mod tests {
         let mut lines = Lines::spawn(|| Ok(source), Keeping::All, skips_first).unwrap();
         let mut found = Vec::new();
         loop {
-            match lines.next(Duration::from_secs(60)) {
+            match lines.next(Duration::from_secs(600)) {
                 Ok(Some(line)) => {
                     let text = lines.text(&line).map(|text| String::from_utf8_lossy(text).into_owned());
                     found.push((line.number, text));
@@ -359,11 +359,11 @@ mod tests {
     fn lines_that_were_taken_over_are_returned_without_the_lock() {
         let mut lines = Lines::spawn(|| Ok(&b"1\n2\n3\n"[..]), Keeping::All, false).unwrap();
         let shared = Arc::clone(&lines.shared);
-        assert!(matches!(lines.next(Duration::from_secs(60)), Ok(Some(_))));
+        assert!(matches!(lines.next(Duration::from_secs(600)), Ok(Some(_))));
         // The reader holds it most of the time when lines arrive fast.
         let _held = shared.lock();
         for number in 2..=3 {
-            let Ok(Some(line)) = lines.next(Duration::from_secs(60)) else {
+            let Ok(Some(line)) = lines.next(Duration::from_secs(600)) else {
                 panic!("no line {number}")
             };
             assert_eq!(line.number, number);
@@ -385,7 +385,7 @@ mod tests {
             }
         }
         let mut lines = Lines::spawn(|| Ok(Panics), Keeping::All, false).unwrap();
-        let Err(Some(error)) = lines.next(Duration::from_secs(60)) else {
+        let Err(Some(error)) = lines.next(Duration::from_secs(600)) else {
             panic!("no error")
         };
         assert!(error.to_string().contains("internal error"), "{error}");

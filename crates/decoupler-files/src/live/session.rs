@@ -597,7 +597,7 @@ mod tests {
             let start = Instant::now();
             for sample in 0..600 {
                 let now = session.input.due(start).map_or(start, |due| due.max(start));
-                while !matches!(session.next(now, Duration::from_secs(60)), SessionEvent::Answer) {}
+                while !matches!(session.next(now, Duration::from_secs(600)), SessionEvent::Answer) {}
                 let expected = trained.set.sample_readings(sample).to_vec();
                 assert_eq!(session.last.readings, expected, "sample {sample}");
             }

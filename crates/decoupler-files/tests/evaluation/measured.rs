@@ -1,9 +1,9 @@
-//! Measured samples in the library: training, cross-validation and tables without any geometry.
+//! Measured samples in the library: training and tables without any geometry.
 
 use decoupler_core::{
-    dataset::{Dataset, PerRow, Split, SplitBy},
+    dataset::{Dataset, PerRow, Split},
     decoupling::{DecoderKind, Precision},
-    evaluation::{CrossValidation, DecoderSet, ErrorTable, Run, RunError, RunSets, RunSettings, Source, TargetErrors},
+    evaluation::{DecoderSet, ErrorTable, Run, RunError, RunSets, RunSettings, Source},
     job::Job,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::RowModel,
@@ -91,42 +91,6 @@ fn networks_of_known_rows_use_the_row_wire_of_each_sample() {
     let mut answers = each.network().decouple(&test.select(&backwards));
     answers.invert_axis(Axis(0));
     assert_eq!(answers, each.decouple_test());
-}
-
-#[test]
-fn the_error_table_is_computed_from_the_answers() {
-    let run = trained(settings(RowModel::Each), &recording(400, &[1, 3], 2), 300);
-    let answers = run.decouple_test();
-    let expected = TargetErrors::measure(run.test().targets(), answers.view());
-    assert_eq!(run.errors().targets(), expected);
-}
-
-#[test]
-fn every_fold_is_answered_by_networks_not_trained_on_it() {
-    // A network trained on its test group would have learned the offset that only this group has.
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let offsets: Vec<f64> = (0..20).map(|_| rng.random_range(-1.0..1.0)).collect();
-    let readings = Array2::from_shape_fn((400, 20), |(sample, channel)| {
-        f64::from(u8::from(sample / 20 == channel))
-    });
-    let targets = Array2::from_shape_fn((400, 1), |(sample, _)| {
-        offsets[sample / 20] + 1e-3 * rng.random::<f64>()
-    });
-    let set = Dataset::new(readings, targets, None, (0..400).map(|sample| sample / 20).collect()).unwrap();
-    let r2 = |unit| {
-        let validation = CrossValidation {
-            folds: 5,
-            repeats: 1,
-            by: unit,
-        };
-        let validated = validation
-            .run(&settings(RowModel::Shared), (&set, &set), 0, &Job::UNINTERRUPTED)
-            .unwrap();
-        validated.scores(&set).network.targets()[0].r2.unwrap()
-    };
-    let [by_sample, by_group] = [SplitBy::Random, SplitBy::Group].map(r2);
-    assert!(by_sample > 0.99, "samples of a test group are trained on: {by_sample}");
-    assert!(by_group < 0.1, "an unseen group cannot be predicted: {by_group}");
 }
 
 #[test]

@@ -1,20 +1,14 @@
 //! Scenes from settings to answers: known rows, single rows, noise, sideways movement.
 
-use std::path::Path;
-
 use decoupler_core::{
-    dataset::{Seed, Simulation},
+    dataset::Simulation,
     decoupling::{DecoderKind, Precision},
-    evaluation::{
-        DecoderSet, Outlook, Preset, Run, RunError, RunSets, RunSettings, TradeOffPoint, TrainingSize, fastest_under,
-        measure_trade_off, most_accurate_under,
-    },
+    evaluation::{DecoderSet, Outlook, Preset, Run, RunSets, RunSettings, TrainingSize},
     job::Job,
     machine::MemoryBudget,
     scene::{Movement, Noise, Rows},
     sensor::SensorModel,
 };
-use decoupler_files::import::Setup;
 
 /// Known rows of a small array, quick to train.
 fn small() -> RunSettings {
@@ -125,41 +119,4 @@ fn with_one_row_only_that_row_is_drawn_and_modelled() {
     scene.simulation_mut().unwrap().scene.movement = Movement::SIDEWAYS;
     let sideways = Outlook::of(scene.simulation().unwrap()).unwrap();
     assert!(!sideways.warnings.is_empty(), "ill-conditioned");
-}
-
-#[test]
-fn a_trade_off_has_a_point_for_every_choice() {
-    let mut settings = RunSettings {
-        source: Simulation {
-            samples: 90,
-            ..*small().simulation().unwrap()
-        }
-        .into(),
-        seed: Seed(3),
-        ..small()
-    };
-    settings.training.stopping.epochs = 3;
-    let mut points: Vec<TradeOffPoint> = Vec::new();
-    let keep = |_, point: Result<_, _>, _: Option<&_>| points.push(point.unwrap());
-    let sets = Setup::from(settings).sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ());
-    let sets = sets.unwrap().sets;
-    measure_trade_off(&settings, &sets, &[2, 3], &DecoderKind::ALL, &Job::UNINTERRUPTED, keep).unwrap();
-    // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
-    assert_eq!(points.len(), 5 + 2 * 3);
-    assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
-    let best = &points[most_accurate_under(&points, f64::INFINITY).unwrap()];
-    assert!(matches!(best.report.kind, DecoderKind::Newton | DecoderKind::Polish));
-    assert!(fastest_under(&points, -1.0).is_none());
-    let fastest = &points[fastest_under(&points, f64::INFINITY).unwrap()];
-    assert!(
-        points
-            .iter()
-            .all(|point| fastest.report.frame_us <= point.report.frame_us)
-    );
-    let mut none = 0;
-    let count = |_, _: Result<_, _>, _: Option<&_>| none += 1;
-    let cancelled = Job::new(&|| true);
-    let measured = measure_trade_off(&settings, &sets, &[2], &DecoderKind::ALL, &cancelled, count);
-    assert!(matches!(measured, Err(RunError::Cancelled(_))));
-    assert_eq!(none, 0);
 }

@@ -130,9 +130,9 @@ mod tests {
         let begun = Instant::now();
         let error = run("exec sleep 1000", 50).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::TimedOut);
-        assert!(begun.elapsed() < Duration::from_secs(100), "{error}");
+        assert!(begun.elapsed() < Duration::from_secs(900), "{error}");
         // More output than a pipe holds.
-        let output = run("head -c 1000000 /dev/zero; echo wrong >&2; exit 3", 60_000).unwrap();
+        let output = run("head -c 1000000 /dev/zero; echo wrong >&2; exit 3", 600_000).unwrap();
         assert_eq!(
             (output.stdout.len(), output.stderr.as_slice()),
             (1_000_000, &b"wrong\n"[..])
