@@ -2,7 +2,7 @@
 //! input equals what was written or gives finite numbers.
 //!
 //! Inputs are the files of a corpus, and valid inputs mutated by a seeded random generator, so failures are
-//! reproducible; `FUZZ_ROUNDS` in the environment multiplies their number: 12 in `.ci/run`, 1000 in a campaign by hand.
+//! reproducible; `FUZZ_ROUNDS` in the environment multiplies their number: 3 in `.ci/run`, 1000 in a campaign by hand.
 //! `bolero` only replays the corpus: without a fuzzer, its own inputs come from a seed of the system, rarely get past
 //! the first brace and are not reproducible. Under `cargo bolero test` the same tests are libFuzzer targets.
 
