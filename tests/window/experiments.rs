@@ -68,7 +68,7 @@ fn by_library(experiment: &Experiment) -> ExperimentResults {
 }
 
 /// Columns of times differ from run to run.
-const TIMES: [&str; 1] = ["training (s)"];
+const TIMES: [&str; 1] = ["training time (s)"];
 
 #[test]
 fn a_table_ends_with_the_librarys_own_numbers() {

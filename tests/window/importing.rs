@@ -135,8 +135,8 @@ fn the_source_selects_the_form_and_keeps_the_settings_of_the_other() {
     );
     driver.choose_by_hand();
     driver.enter("Hidden nodes", "5");
-    driver.unfold_to("Advanced", "Whitening");
-    driver.click_button("Whitening");
+    driver.unfold_to("Advanced", "Scaling");
+    driver.choose("Scaling", "Whitening");
     driver.settle();
     let chosen = driver.state().settings();
     assert_eq!((chosen.hidden, chosen.inputs.scaling), (5, ScalingChoice::Whitening));
@@ -299,14 +299,14 @@ fn row_wires_offer_a_network_for_each_and_without_them_there_is_one() {
     }
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.mean("row", "row-wire");
-    driver.unfold_to("Advanced", "Known");
-    driver.click_button("Known");
+    driver.unfold_to("Advanced", "Rows");
+    driver.choose("Rows", "Known");
     driver.settle();
     assert_eq!(driver.state().settings().source.row_model(), RowModel::Each);
     driver.mean("row", "unused");
     driver.settle();
     assert_eq!(driver.state().settings().source.row_model(), RowModel::Shared);
-    assert!(!driver.has("Known"));
+    assert!(!driver.has("Rows"));
 }
 
 #[test]
@@ -425,10 +425,12 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
 fn a_random_split_is_reported_as_optimistic() {
     let (mut driver, _path, _folder) = opened(40);
     assert!(!driver.says("A random split is optimistic"));
-    driver.unfold_to("Samples", "random");
-    driver.click_button("random");
+    driver.unfold_to("Samples", "Split by");
+    driver.choose("Split by", "random");
     driver.settle();
     assert!(driver.says("A random split is optimistic"));
+    driver.click("Split by");
+    driver.settle();
     let group = By::new().role(Role::Button).label("group");
     assert!(
         driver.harness().query(group).is_none(),
