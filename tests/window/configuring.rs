@@ -132,55 +132,6 @@ fn any_array_can_be_typed_and_an_invalid_one_is_explained_and_rejected() {
 }
 
 #[test]
-fn typed_numbers_are_kept_within_their_limits() {
-    let mut driver = Driver::open();
-    for (label, text) in [
-        ("Hidden nodes", "17"),
-        ("Training samples", "330"),
-        ("Validation samples", "0"),
-        ("Test samples", "40"),
-        ("Epochs", "77"),
-        ("Seed", "9007199254740991"),
-        ("Largest compression", "12.5"),
-        ("Mu", "1e-4"),
-    ] {
-        driver.enter(label, text);
-    }
-    let draft = driver.state().draft;
-    assert_eq!(
-        (
-            draft.hidden,
-            draft.simulation().unwrap().samples,
-            draft.simulation().unwrap().validation_samples
-        ),
-        (17, 330, 0),
-        "{draft:?}"
-    );
-    assert_eq!(
-        (
-            draft.simulation().unwrap().test_samples,
-            draft.training.stopping.epochs,
-            draft.seed.0
-        ),
-        (40, 77, (1 << 53) - 1)
-    );
-    assert_eq!(draft.simulation().unwrap().scene.largest_compression, 0.125);
-    let Method::LevenbergMarquardt(settings) = draft.training.method else {
-        panic!("{draft:?}")
-    };
-    assert_eq!(settings.mu, 1e-4);
-    driver.wait("the new test set", |driver| driver.says("1 of 4"));
-
-    for (label, text) in [("Hidden nodes", "0"), ("Training samples", "-5"), ("Epochs", "0")] {
-        driver.enter(label, text);
-        assert_eq!(driver.state().draft, draft, "{text} {label} are rejected");
-    }
-    driver.enter("Hidden nodes", "a dozen");
-    assert_eq!(driver.state().draft.hidden, 17, "words are rejected");
-    driver.settle();
-}
-
-#[test]
 fn a_method_shows_only_its_own_settings() {
     let mut driver = Driver::open();
     let damping = ["Mu", "Mu decrease", "Mu increase", "Largest mu"];

@@ -159,29 +159,6 @@ fn the_list_of_actions_finds_terms_too() {
 }
 
 #[test]
-fn empty_views_fill_on_a_click() {
-    let mut driver = Driver::open();
-    driver.configure_small();
-    driver.click_button("Compare");
-    assert!(driver.says("Every finished training is kept here"));
-    driver.click_button("Study");
-    driver.settle();
-    assert!(driver.is_enabled("▶ Run"));
-    driver.click("Speed against accuracy");
-    driver.settle();
-    assert!(driver.is_enabled("▶ Run"));
-    driver.click_button("Train");
-    driver.settle();
-    driver.click("▶ Train");
-    driver.wait_for_end();
-    driver.click_button("Study");
-    driver.click("Table 1");
-    driver.click_button("▶ Run");
-    driver.wait("the experiment", |driver| driver.is_enabled("■ Cancel"));
-    driver.click("■ Cancel");
-}
-
-#[test]
 fn compare_opens_on_the_last_two_runs() {
     let mut driver = Driver::open();
     driver.configure_small();

@@ -104,7 +104,7 @@ fn without_times(value: &mut Value) {
 /// Trains in the terminal with these options.
 #[track_caller]
 fn train_in_terminal(options: &str, folder: &Path) -> Value {
-    let output = decoupler(&format!("train {options} --out terminal.json"), folder);
+    let output = decoupler(&format!("train {options} --decoder mean --out terminal.json"), folder);
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{options}: {message}");
     run_of(&folder.join("terminal.json"))
