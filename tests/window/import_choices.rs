@@ -126,7 +126,7 @@ fn a_split_and_its_shares_are_kept_if_a_column_is_a_group() {
     let (mut driver, _path, folder) = opened_text(&sessions());
     driver.assert_says("group, 20 % test");
     driver.unfold_to("Samples", "Test share");
-    driver.click_button("time");
+    driver.choose("Split by", "time");
     driver.enter("Test share", "30");
     driver.enter("Validation share", "25");
     driver.settle();

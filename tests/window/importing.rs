@@ -8,14 +8,15 @@ use std::{
 
 use decoupler::window::{Notice, SourceKind};
 use decoupler_core::{network::ScalingChoice, scene::RowModel};
-use decoupler_files::export::{NetworkFile, RecipeFile};
+use decoupler_files::export::NetworkFile;
 use eframe::egui::{self, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::{
     driver::Driver,
     habits::pause,
-    recordings::{opened, opened_text, plan, recording, settings, trained, written},
+    recordings::{opened, opened_text, recording, setup, written},
+    sources::run_of,
 };
 
 #[track_caller]
@@ -53,8 +54,8 @@ fn a_dropped_file_is_trained_on_with_one_click_as_by_the_library() {
     driver.limit_epochs("5");
     // From here on one click is enough.
     driver.train_recording();
-    let run = trained(&plan(&path));
-    assert_eq!(driver.state().run.as_ref().unwrap().settings(), &settings());
+    let run = run_of(&setup(&path));
+    assert_eq!(driver.state().run.as_ref().unwrap().settings(), setup(&path).settings());
     assert_eq!(driver.state().result().unwrap().errors, run.errors());
     // The results replace the columns, which a button brings back.
     assert!(!driver.has("Meaning of u1"));
@@ -134,8 +135,8 @@ fn the_source_selects_the_form_and_keeps_the_settings_of_the_other() {
     );
     driver.choose_by_hand();
     driver.enter("Hidden nodes", "5");
-    driver.unfold_to("Advanced", "Whitening");
-    driver.click_button("Whitening");
+    driver.unfold_to("Advanced", "Scaling");
+    driver.choose("Scaling", "Whitening");
     driver.settle();
     let chosen = driver.state().settings();
     assert_eq!((chosen.hidden, chosen.inputs.scaling), (5, ScalingChoice::Whitening));
@@ -298,14 +299,14 @@ fn row_wires_offer_a_network_for_each_and_without_them_there_is_one() {
     }
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.mean("row", "row-wire");
-    driver.unfold_to("Advanced", "Known");
-    driver.click_button("Known");
+    driver.unfold_to("Advanced", "Rows");
+    driver.choose("Rows", "Known");
     driver.settle();
     assert_eq!(driver.state().settings().source.row_model(), RowModel::Each);
     driver.mean("row", "unused");
     driver.settle();
     assert_eq!(driver.state().settings().source.row_model(), RowModel::Shared);
-    assert!(!driver.has("Known"));
+    assert!(!driver.has("Rows"));
 }
 
 #[test]
@@ -385,17 +386,9 @@ fn two_files_are_joined_by_time_and_filtered() {
     driver.wait("the filtered samples", |driver| driver.says("states.c3<3 is not met"));
     driver.wait("the samples", |driver| driver.has("Test: 11"));
     assert!(driver.has("Training: 42"), "53 of 70 rows are left");
-
-    // The import is saved as a recipe, which the terminal reads too, and opened again.
-    let recipe = folder.path().join("recipe.json");
-    driver.save("Recipe, JSON", &recipe);
-    let plan = RecipeFile::load_recording(&recipe).unwrap();
+    let plan = driver.plan();
     assert_eq!(plan.import.targets, ["states.c2"]);
     assert_eq!(plan.import.conditions[0].to_string(), "states.c3<3");
-    let mut other = Driver::open();
-    other.open_recordings(&[&recipe]);
-    assert!(other.has("Training: 42") && other.has("Test: 11"));
-    assert_meanings(&other, &[("states.c3", "unused")]);
 }
 
 #[test]
@@ -432,10 +425,12 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
 fn a_random_split_is_reported_as_optimistic() {
     let (mut driver, _path, _folder) = opened(40);
     assert!(!driver.says("A random split is optimistic"));
-    driver.unfold_to("Samples", "random");
-    driver.click_button("random");
+    driver.unfold_to("Samples", "Split by");
+    driver.choose("Split by", "random");
     driver.settle();
     assert!(driver.says("A random split is optimistic"));
+    driver.click("Split by");
+    driver.settle();
     let group = By::new().role(Role::Button).label("group");
     assert!(
         driver.harness().query(group).is_none(),

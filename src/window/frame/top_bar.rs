@@ -57,8 +57,6 @@ pub(super) fn top_bar_ui(
             tools_ui(ui, effects);
             if is_wide {
                 ui.add_space(space(2));
-                button_ui(ui, Command::Undo, "↺", effects);
-                button_ui(ui, Command::Redo, "↻", effects);
             }
             button_ui(ui, Command::Search, if is_wide { "Search" } else { "…" }, effects);
             if width >= SMALL {

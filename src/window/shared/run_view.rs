@@ -16,16 +16,16 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let button = ghost_button(longer.about().name);
         command_button_ui(ui, shared, longer, button, None, effects);
     }
-    command_button_ui(ui, shared, Command::Train, primary_button("▶ Train"), None, effects);
-    let pause = if shared.phase == Phase::Paused {
-        "▶ Resume"
-    } else {
-        "⏸ Pause"
-    };
-    for (command, text) in [(Command::PauseTraining, pause), (Command::StopTraining, "■ Stop")] {
-        let shown = text.split(' ').next().filter(|_| is_short).unwrap_or(text);
-        command_button_ui(ui, shared, command, ghost_button(shown), Some(text), effects);
+    // They appear before Train, which stays where it is under the pointer.
+    if shared.obstacle(&Command::StopTraining).is_none() {
+        let is_paused = shared.phase == Phase::Paused;
+        let pause = if is_paused { "▶ Resume" } else { "⏸ Pause" };
+        for (command, text) in [(Command::PauseTraining, pause), (Command::StopTraining, "■ Stop")] {
+            let shown = text.split(' ').next().filter(|_| is_short).unwrap_or(text);
+            command_button_ui(ui, shared, command, ghost_button(shown), Some(text), effects);
+        }
     }
+    command_button_ui(ui, shared, Command::Train, primary_button("▶ Train"), None, effects);
 }
 
 /// Returns the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of

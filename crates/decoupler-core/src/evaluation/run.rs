@@ -86,6 +86,11 @@ impl Run {
         self.wall_time
     }
 
+    /// The training time that is shown and saved: the wall time, or as far as known for a resumed run.
+    pub fn training_time(&self) -> Duration {
+        self.wall_time.unwrap_or_else(|| self.leader().elapsed())
+    }
+
     /// Sets the time of a resumed run, if it was saved.
     pub fn with_wall_time(mut self, saved: Option<Duration>) -> Self {
         self.wall_time = saved.or(self.wall_time);

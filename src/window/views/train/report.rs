@@ -69,6 +69,13 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         if view.scrub.epoch().is_some() {
             dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
         }
+        if let (Combination::Mean, 2..) = (run.settings().combine, run.starts.len()) {
+            let text = format!(
+                "The network is the average of {}; Details lists each of them.",
+                run.starts.len()
+            );
+            dim_ui(ui, &text);
+        }
         if let (Some(errors), Some(skin)) = (result.errors.nodes(), &run.test.skin) {
             worst_node_ui(ui, view, errors, skin);
         }
@@ -376,12 +383,8 @@ fn good_ui(ui: &mut Ui, text: &str) {
 
 fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let epochs = result.epochs_run;
-    let training = match run.settings().starts {
-        ..=1 => "Training",
-        _ => "Training, all restarts",
-    };
     let text = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
-    let mut rows = vec![(training, text(result.wall_time))];
+    let mut rows = vec![("Training time", text(result.wall_time))];
     if epochs > 0 {
         let an_epoch = result.wall_time.map(|time| time.div_f64(epochs as f64));
         rows.push(("Time per epoch", text(an_epoch)));
@@ -445,9 +448,9 @@ fn spread_ui(ui: &mut Ui, run: &RunView) {
     let table = Table {
         columns: vec![
             TableColumn::new("error", "", ""),
-            TableColumn::field("min").meaning("Best start."),
-            TableColumn::field("median").meaning("Median of all starts: the typical result of a single start."),
-            TableColumn::field("max").meaning("Worst start."),
+            TableColumn::field("min").meaning("Best restart."),
+            TableColumn::field("median").meaning("Median of all restarts: the typical result of a single one."),
+            TableColumn::field("max").meaning("Worst restart."),
         ],
         rows: spreads.into_iter().filter_map(row).collect(),
     };
@@ -456,7 +459,7 @@ fn spread_ui(ui: &mut Ui, run: &RunView) {
     dim_ui(
         ui,
         &match run.settings().combine {
-            Combination::Best => format!("Start {best} is kept: it has the lowest {error}."),
+            Combination::Best => format!("Restart {best} is kept: it has the lowest {error}."),
             Combination::Mean => format!(
                 "Their average is used, which is often better than each; network {best} has the lowest {error}."
             ),

@@ -20,7 +20,7 @@ use crate::window::{
     shared::{Effect, Shared},
     widgets::{
         dim_ui,
-        fields::{input_text, list_ui, options_ui, percent_ui, seed_ui},
+        fields::{input_text, list_ui, percent_ui, seed_ui},
         fold_ui, ghost_button, note_ui,
     },
 };
@@ -353,7 +353,7 @@ impl RecordingEditor {
         let offered = Vec::from_iter(offered.map(|&by| (by, by.name(), bias(by))));
         let hint = "Rule by which samples are divided into training, validation and test. To split by group, make a column \
                     “group” in the table.";
-        division.by = options_ui(ui, "Split by", hint, &offered, division.by).unwrap_or(division.by);
+        division.by = list_ui(ui, "Split by", hint, &offered, division.by).unwrap_or(division.by);
         if import.plan.test.is_some() {
             let text = "All samples of the test files are test samples; close these files to hold out a share instead.";
             dim_ui(ui, text);
