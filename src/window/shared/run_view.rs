@@ -38,9 +38,11 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         button_ui(ui, text, can_pause, command, effect);
         button_ui(ui, "■ Stop", true, Command::StopTraining, Effect::Stop);
     }
-    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
+    let obstacle = shared.obstacle();
+    let train = ui.add_enabled(!phase.is_busy() && obstacle.is_none(), primary_button("▶ Train"));
     let hint = Command::Train.about().tooltip(ui.ctx());
-    if train.on_hover_text(hint).clicked() {
+    let train = train.on_hover_text(&hint);
+    if train.on_disabled_hover_text(obstacle.unwrap_or(&hint)).clicked() {
         effects.push(Effect::Train);
     }
 }
@@ -76,8 +78,7 @@ fn phase_in_words(shared: &Shared) -> Status {
         phase => phase,
     };
     let (tone, text) = match phase {
-        Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
-        Phase::Idle => (Tone::Calm, "Ready: press Train"),
+        Phase::Idle => (Tone::Calm, shared.obstacle().unwrap_or("Ready: press Train")),
         Phase::Preparing if is_recording => {
             let preparing = shared.preparing.as_ref().map(|preparing| preparing.text.as_str());
             (Tone::Busy, preparing.unwrap_or("Reading the recording"))
