@@ -79,11 +79,7 @@ impl Command {
             Self::PauseTraining => ("Pause or resume training", ctrl(Key::P), ""),
             Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
             Self::OpenFiles => ("Open files", None, "A recording, recipe, network or checkpoint."),
-            Self::DecodeFile => (
-                "Decode file",
-                None,
-                "All rows of another file, with the network, to CSV.",
-            ),
+            Self::DecodeFile => ("Decode file", None, "Decodes all samples of another file, to CSV."),
             Self::PressMiddle => ("Press the middle of the surface", None, "Touch the sensor."),
             Self::NextSample => ("Next test sample", plain(Key::PageDown), ""),
             Self::PreviousSample => ("Previous test sample", plain(Key::PageUp), ""),
@@ -94,7 +90,7 @@ impl Command {
             Self::Begin(name) => (*name, ctrl(Key::Enter), "Start."),
             Self::Cancel(name) => (*name, ctrl(Key::Period), "Stop; what has finished is kept."),
             Self::Record => ("Start or end recording", ctrl(Key::R), "Write each frame to a file."),
-            Self::ReZero => ("Re-zero", None, "Take the present readings as those at rest."),
+            Self::ReZero => ("Re-zero", None, "Take the current readings as those at rest."),
             Self::PlayReplay => ("Pause or resume replay", ctrl(Key::P), ""),
             Self::Export(name) => (name.as_str(), None, ""),
             Self::Undo => ("Undo change of settings", ctrl(Key::Z), ""),
@@ -135,11 +131,12 @@ impl Command {
 
     /// Returns the reason why it is not available now, if the shared state has one. What only a view or the frame knows, such
     /// as the displayed sample or the size of the window, it adds where it offers the command.
-    pub fn obstacle(&self, shared: &Shared) -> Option<&'static str> {
+    pub fn obstacle<'s>(&self, shared: &'s Shared) -> Option<&'s str> {
         const RUNNING: &str = "A training is running: stop it first.";
         let phase = shared.phase;
         let has_trained = || shared.shown_run().is_some_and(|run| run.stop_reason.is_some());
         let (is_met, obstacle) = match self {
+            Self::Train if !phase.is_busy() => return shared.missing_recording(),
             Self::Train | Self::OpenFiles | Self::Undo | Self::Redo => (!phase.is_busy(), RUNNING),
             Self::TrainLonger => (shared.can_continue(), "No training of these samples has ended."),
             Self::PauseTraining => (

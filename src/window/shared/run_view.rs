@@ -59,8 +59,7 @@ fn phase_in_words(shared: &Shared) -> Status {
         phase => phase,
     };
     let (tone, text) = match phase {
-        Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
-        Phase::Idle => (Tone::Calm, "Ready: press Train"),
+        Phase::Idle => (Tone::Calm, shared.missing_recording().unwrap_or("Ready: press Train")),
         Phase::Preparing if is_recording => {
             let preparing = shared.preparing.as_ref().map(|preparing| preparing.text.as_str());
             (Tone::Busy, preparing.unwrap_or("Reading the recording"))

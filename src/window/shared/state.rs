@@ -195,6 +195,13 @@ impl Shared {
         }
     }
 
+    /// Returns what the recording that is to be trained on lacks, with what to do.
+    pub fn missing_recording(&self) -> Option<&str> {
+        let is_recording = self.source == SourceKind::Recording;
+        let reason = self.recording.plan.as_ref().err().filter(|_| is_recording);
+        reason.map(String::as_str)
+    }
+
     /// Setup of the next training.
     ///
     /// # Errors
