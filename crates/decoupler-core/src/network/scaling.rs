@@ -427,6 +427,24 @@ mod tests {
         }
     }
 
+    /// Compared with the mean in integers.
+    #[test]
+    fn the_mean_of_many_values_is_accurate_to_its_last_place() {
+        const ONE: u64 = 1 << 52;
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let units = Vec::from_iter((0..5001).map(|_| rng.random_range(ONE..2 * ONE)));
+        let values = Array2::from_shape_fn((units.len(), 1), |(sample, _)| units[sample] as f64 / ONE as f64);
+        let total: u128 = units.iter().map(|units| u128::from(*units)).sum();
+        let mean = (total / units.len() as u128) as f64 / ONE as f64;
+        let naive = values.column(0).iter().sum::<f64>() / units.len() as f64;
+        let error = (fit(&values, 0.0).unwrap().mean[0] - mean).abs();
+        assert!(
+            error <= 2.0 * f64::EPSILON,
+            "{error:e}, by a plain sum {:e}",
+            naive - mean
+        );
+    }
+
     #[test]
     fn components_below_the_noise_are_left_out_and_those_near_it_are_scaled_down() {
         let values = correlated(500);

@@ -129,6 +129,15 @@ mod tests {
     }
 
     #[test]
+    fn exponentials_agree_with_the_standard_library_and_end_where_they_are_subnormal() {
+        for x in (-708..=709).map(f64::from) {
+            assert!((exp(x) / x.exp() - 1.0).abs() <= 4.0 * f64::EPSILON, "{x}: {}", exp(x));
+        }
+        assert_eq!([exp(-800.0), exp(f64::NEG_INFINITY)], [exp(-708.0); 2]);
+        assert!(exp(f64::NAN).is_nan());
+    }
+
+    #[test]
     fn single_precision_agrees_with_double() {
         let magnitudes = (0..=20_000)
             .map(|i| i as f32 * 1e-3)

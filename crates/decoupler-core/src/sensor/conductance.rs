@@ -310,8 +310,24 @@ mod tests {
         assert!(RowConductance::is_within_reach(&model, 0.5, 2.0));
         assert!(!RowConductance::is_within_reach(&model, 0.0, 2.0));
         assert!(!RowConductance::is_within_reach(&model, 1e-20, 2.0));
+        assert!(
+            !RowConductance::is_within_reach(&model, -0.5, 5.5),
+            "beyond the column-wires"
+        );
         model.geometry.column_pitch_mm = 1e20;
         assert!(!RowConductance::is_within_reach(&model, 0.5, 2.0));
+    }
+
+    #[test]
+    fn a_node_on_a_column_wire_conducts_without_limit_there_alone() {
+        let model = SensorModel::new("2x4_3x12".parse().unwrap());
+        let mut at = [DVec3::ZERO; 4];
+        at[1] = model.displacement_mm(1, 1, model.geometry.column_node_mm(5, 2));
+        let mut row = RowConductance::new(&model, Axes::Z);
+        row.evaluate_sums(&model, 1, &at);
+        assert!(row.sums()[5] > 1e10, "{}", row.sums()[5]);
+        assert!(row.sums().iter().all(|sum| *sum > 0.0));
+        assert_eq!(row.sums().iter().filter(|sum| **sum > 1e10).count(), 1);
     }
 
     /// The Jacobian of [`SensorModel`] is tested against central differences; R = g/s relates the two.

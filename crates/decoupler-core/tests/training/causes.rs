@@ -144,6 +144,7 @@ fn late_divergence_names_the_epoch_and_keeps_the_best_weights() {
         let errors = history.iter().filter_map(|record| record.validation_mse);
         assert_eq!(trainer.best_mse(), errors.fold(f64::INFINITY, f64::min));
         assert!(trainer.best_mse() < history[0].validation_mse.unwrap());
+        assert_eq!(trainer.present().weights(), trainer.best().weights());
     }
     assert!(found, "one of these diverges after initial progress");
 }

@@ -1,6 +1,9 @@
 //! The stopping rules are those of the field's toolbox.
 
-use decoupler_core::training::{EpochRecord, Method, StopReason, StoppingRules, Trainer, TrainingSettings};
+use decoupler_core::training::{
+    EpochRecord, ExampleSets, Examples, Method, StopReason, StoppingRules, Trainer, TrainingSettings,
+};
+use ndarray::Array2;
 
 use crate::problems::{problem, start, trainer};
 
@@ -74,6 +77,44 @@ fn training_stops_at_the_first_epoch_with_max_failures() {
                 trainer.stop_reason()
             );
         }
+    }
+}
+
+/// Validation targets of which no error is known.
+#[test]
+fn an_unknown_validation_error_is_a_failure() {
+    let nan = Array2::from_elem((1, 2), f64::NAN);
+    let problem = ExampleSets {
+        validation: Some(Examples::new(Array2::zeros((1, 3)).view(), nan.view())),
+        ..problem()
+    };
+    let settings = TrainingSettings::default();
+    let mut trainer = Trainer::new(start(), problem, settings).expect("it can be trained");
+    while trainer.step().is_none() {}
+    assert_eq!(trainer.stop_reason(), Some(StopReason::ValidationRose));
+    assert_eq!(trainer.history().len(), settings.stopping.max_fail);
+}
+
+#[test]
+fn training_ends_at_the_first_epoch_that_reaches_the_goal() {
+    for method in Method::all() {
+        let mut endless = trainer(method);
+        for _ in 0..40 {
+            endless.step();
+        }
+        let goal_mse = endless.history()[30].training_mse;
+        let first = endless
+            .history()
+            .iter()
+            .position(|epoch| epoch.training_mse <= goal_mse);
+        let stopping = StoppingRules {
+            goal_mse,
+            ..endless.settings().stopping
+        };
+        let mut trainer = Trainer::new(start(), problem(), TrainingSettings { method, stopping }).expect("as before");
+        while trainer.step().is_none() {}
+        assert_eq!(trainer.stop_reason(), Some(StopReason::GoalReached), "{method}");
+        assert_eq!(Some(trainer.latest().epoch), first, "{method}");
     }
 }
 
