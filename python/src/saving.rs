@@ -42,7 +42,7 @@ impl Origin {
         Self {
             stop_reason: run.stop_reason(),
             best_epoch: leader.best_epoch(),
-            seconds: leader.elapsed().as_secs_f64(),
+            seconds: run.training_time().as_secs_f64(),
             history: leader.history().to_vec(),
             stages: leader.stages().to_vec(),
             division,

@@ -76,22 +76,22 @@ terms! { ERROR_TERMS:
     Z_PERCENT = "Z %",
         "AveZerr of the paper: mean |error| of z in percent of the coordinate z, which is never near 0. Always answering \
          the mean scores about 5 % on the paper's scene.",
-        "100 · mean(|decoupled z − z| / |z|)";
+        "100 · mean(|decoded z − z| / |z|)";
     X_PERCENT = "X %",
         "AveXerr of the paper: mean |error| of x in percent of the coordinate x.",
-        "100 · mean(|decoupled x − x| / |x|)";
+        "100 · mean(|decoded x − x| / |x|)";
     Y_PERCENT = "Y %",
         "AveYerr of the paper: mean |error| of y in percent of the coordinate y.",
-        "100 · mean(|decoupled y − y| / |y|)";
+        "100 · mean(|decoded y − y| / |y|)";
     Z_MM = "mm",
         "Mean |error| of z in millimetres.",
-        "mean(|decoupled z − z|)";
+        "mean(|decoded z − z|)";
     STROKE_PERCENT = "stroke %",
         "Mean |error| of z in percent of the full scale, the distance a node can travel.",
-        "100 · mean(|decoupled z − z|) / stroke";
+        "100 · mean(|decoded z − z|) / stroke";
     WORST_NODE = "Worst node",
         "Largest |error| of z of any node in the test set, in mm.",
-        "max(|decoupled z − z|)";
+        "max(|decoded z − z|)";
     LINEAR_MAP = "Linear map",
         "Best affine map from the resistances to the coordinates, one for each row-wire where the row is known to the network. A \
          network that is not better is not worth training.",
@@ -129,12 +129,12 @@ terms! { NETWORK_TERMS:
          large ones, unless noise hides them.",
         "component / √(σ² + noise²)";
     STARTS = "Restarts",
-        "Number of trainings from different random weights, side by side. Several starts show how much the results vary.";
+        "Number of trainings from different random weights, side by side. Several show how much the results vary.";
     AUTO = "Automatic settings",
         "History of readings, scaling, hidden nodes, method and epochs are chosen by cross-validation on the training samples, in about a \
          minute; the answer is the best combination of ridge, kernel ridge and networks. Turned off, the form begins with the settings that were chosen.";
     COMBINE = "Combine restarts",
-        "Keep the start with the lowest validation error, or average the answers of all starts: their mean is one network \
+        "Keep the restart with the lowest validation error, or average the answers of all restarts: their mean is one network \
          with the hidden nodes of all, and varies less than any of them.";
     SEED = "Seed",
         "Seed of all random numbers: the same seed gives the same network.";
@@ -147,7 +147,7 @@ terms! { TRAINING_TERMS:
         "One pass over the training set, after which the weights change.";
     MSE = "mse",
         "Mean square error of the scaled coordinates, each in [−1, 1]; those that are constant are left out.",
-        "mse = mean (decoupled − actual)²";
+        "mse = mean (decoded − actual)²";
     TRAINING_SET = "Training set",
         "The samples to which the network is fitted.";
     VALIDATION_SET = "Validation set",
@@ -199,7 +199,7 @@ terms! { SENSOR_TERMS:
         "Samples that belong together, such as those of a snapshot or of one subject, and are never split between \
          training and test.";
     DECOUPLING = "Decoupling",
-        "Recovering the coordinates of each node from readings that each mix many nodes.";
+        "Decoding the coordinates of each node from readings that each mix many nodes.";
     HEIGHT = "Height",
         "Height of the row-wires above the column-wires, undeformed, in mm.";
     RESISTIVITY = "Resistivity",

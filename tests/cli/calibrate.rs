@@ -103,7 +103,7 @@ fn impossible_readings_and_depths_are_refused_with_their_line() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path());
     let path = folder.path();
-    let small = "--samples 40 --set validation-samples=0 --set test-samples=8 --epochs 1";
+    let small = "--decoder mean --samples 40 --set validation-samples=0 --set test-samples=8 --epochs 1";
     success(&format!("train --array {ARRAY} {small} --out net.json"), path);
     let valid = read(path, "frames.csv");
     let calibrate = format!("calibrate --array {ARRAY} {FRAMES}");

@@ -19,11 +19,11 @@ use crate::{
 };
 
 /// Two starts; the number of epochs is appended.
-const LONG: &str = "--array 10x6_3x18 --samples 300 --hidden 8 --starts 2 --seed 2 --set max-fail=1000000 --set min-gradient=0 --epochs";
-const SHORT: &str = "--array 10x6_3x18 --samples 100 --hidden 4 --seed 5 --epochs 10";
+const LONG: &str = "--decoder mean --array 10x6_3x18 --samples 300 --hidden 8 --starts 2 --seed 2 --set max-fail=1000000 --set min-gradient=0 --epochs";
+const SHORT: &str = "--decoder mean --array 10x6_3x18 --samples 100 --hidden 4 --seed 5 --epochs 10";
 /// The same settings; the number of epochs is appended.
-const UNTIL: &str = "--array 10x6_3x18 --samples 100 --hidden 4 --seed 5 --epochs";
-const RESUME: &str = "train --checkpoint run.checkpoint --resume";
+const UNTIL: &str = "--decoder mean --array 10x6_3x18 --samples 100 --hidden 4 --seed 5 --epochs";
+const RESUME: &str = "train --checkpoint run.checkpoint --resume --decoder mean";
 
 /// The network file without its times, which may differ.
 fn network(folder: &Path, name: &str) -> NetworkFile {
@@ -112,7 +112,8 @@ fn a_hangup_that_is_ignored_stays_ignored() {
 fn an_interrupted_training_without_a_checkpoint_suggests_one() {
     let folder = tempfile::tempdir().unwrap();
     let interrupted_after = |seconds| {
-        let arguments = "train --epochs 1000000 --set max-fail=1000000 --set min-gradient=0 --out n.json";
+        let arguments =
+            "train --decoder mean --epochs 1000000 --set max-fail=1000000 --set min-gradient=0 --out n.json";
         let child = spawn(arguments, folder.path());
         thread::sleep(Duration::from_secs(seconds));
         signal("INT", &child);
@@ -121,7 +122,7 @@ fn an_interrupted_training_without_a_checkpoint_suggests_one() {
         (output.status.code(), message, printed)
     };
     // Before the first epoch there is nothing to save and the program ends at once; then more time is allowed.
-    let mut outputs = [1, 5, 20, 100].into_iter().map(interrupted_after);
+    let mut outputs = [1, 5, 20, 100, 500].into_iter().map(interrupted_after);
     let (status, message, printed) = outputs.find(|(_, message, _)| message.contains("after epoch")).unwrap();
     assert_eq!(status, Some(130), "{message}");
     has(&message, &["use --checkpoint FILE to be able to resume"]);

@@ -120,7 +120,7 @@ fn one_network_per_row_wire_is_set_by_hand() {
     driver.mean("row", "row-wire");
     driver.unfold_to("Advanced", "Scaling");
     assert!(driver.is_enabled("Choose settings automatically"));
-    driver.click_button("Known");
+    driver.choose("Rows", "Known");
     driver.settle();
     assert!(!driver.is_enabled("Choose settings automatically"));
     assert!(driver.is_enabled("Hidden nodes") && driver.is_enabled("Method"));

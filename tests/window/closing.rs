@@ -183,7 +183,7 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
     assert!(driver.close());
 
     let mut driver = Driver::open();
-    driver.click("10×6");
+    driver.choose("Paper's array", "10×6_3×18");
     driver.click_button("Study");
     driver.click("Speed against accuracy");
     trading::tiny(&mut driver);

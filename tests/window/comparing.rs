@@ -9,7 +9,7 @@ use eframe::egui::{Event, Key};
 
 use crate::{
     driver::{Driver, small, trained},
-    sources::{probe, skin_with_positions, with_epochs},
+    sources::{BOTH, Opened, open_small, probe, skin_with_positions, with_epochs},
 };
 
 const FIRST: &str = "10×6_3×18 h6 lm";
@@ -227,7 +227,7 @@ fn displayed_pictures_are_saved_in_the_format_of_their_extension() {
     let tabs = ["Loss", "Histogram", "Regression", "Nodes"];
     let mut pictures = Vec::new();
     for tab in tabs {
-        driver.click(tab);
+        driver.show_chart(tab);
         let path = at(&format!("{tab}.svg"));
         driver.save(CHART, &path);
         driver.click("Dismiss");
@@ -374,4 +374,31 @@ fn targets_with_positions_are_compared_on_surfaces() {
     driver.click_button("Error");
     driver.settle();
     assert!(driver.has("Surface of A") && !driver.says("against actual"));
+}
+
+#[test]
+fn a_training_has_one_time_in_every_view() {
+    for source in BOTH {
+        let Opened { mut driver, folder, .. } = {
+            let mut opened = open_small(source);
+            opened.change(|settings| settings.starts = 3);
+            opened
+        };
+        driver.train();
+        driver.wait_for_last_epoch();
+        driver.wait_for_kept_run();
+        driver.details();
+        let texts = driver.texts();
+        let place = texts.iter().position(|text| text == "Training time").unwrap();
+        let time = &texts[place + 1];
+        assert!(driver.has(&format!("{time} in total")), "the status line: {texts:#?}");
+        let report = folder.path().join("report.html");
+        driver.save("Report, HTML", &report);
+        driver.click("Dismiss");
+        assert!(fs::read_to_string(report).unwrap().contains(&format!(" in {time} (")));
+        driver.click_button("Compare");
+        driver.wait("the run", |driver| {
+            driver.has(&format!("Training time, A: {time}")) && driver.says(&format!("training time {time}"))
+        });
+    }
 }

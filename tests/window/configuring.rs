@@ -21,7 +21,7 @@ fn the_window_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
     assert_eq!(driver.state().draft, RunSettings::default());
     assert!(driver.has("Ready: press Train"));
     assert!(driver.is_enabled("▶ Train"));
-    assert!(!driver.is_enabled("■ Stop") && !driver.is_enabled("⏸ Pause"));
+    assert!(!driver.has("■ Stop") && !driver.has("⏸ Pause"), "nothing runs");
     let surface = driver.get("Actual surface").accesskit_node();
     assert_eq!(surface.role(), Role::Image);
     let value = surface.value().unwrap();
@@ -81,7 +81,7 @@ fn rules_of_thumb_are_shown_in_plain_words() {
 fn presets_set_the_array_and_its_surface_follows() {
     let mut driver = Driver::open();
     for scale in ArrayScale::PRESETS {
-        driver.click(&format!("{}×{}", scale.rows(), scale.nodes_per_row()));
+        driver.choose("Paper's array", &scale.to_string());
         assert_eq!(driver.simulation().sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
@@ -128,55 +128,6 @@ fn any_array_can_be_typed_and_an_invalid_one_is_explained_and_rejected() {
     driver.enter("Array scale", "4x5_2x15");
     assert_eq!(driver.get("Array scale").value().as_deref(), Some("4×5_2×15"));
     assert!(!driver.says("is not an array scale") && !driver.says("3·M2 = 15"));
-    driver.settle();
-}
-
-#[test]
-fn typed_numbers_are_kept_within_their_limits() {
-    let mut driver = Driver::open();
-    for (label, text) in [
-        ("Hidden nodes", "17"),
-        ("Training samples", "330"),
-        ("Validation samples", "0"),
-        ("Test samples", "40"),
-        ("Epochs", "77"),
-        ("Seed", "9007199254740991"),
-        ("Largest compression", "12.5"),
-        ("Mu", "1e-4"),
-    ] {
-        driver.enter(label, text);
-    }
-    let draft = driver.state().draft;
-    assert_eq!(
-        (
-            draft.hidden,
-            draft.simulation().unwrap().samples,
-            draft.simulation().unwrap().validation_samples
-        ),
-        (17, 330, 0),
-        "{draft:?}"
-    );
-    assert_eq!(
-        (
-            draft.simulation().unwrap().test_samples,
-            draft.training.stopping.epochs,
-            draft.seed.0
-        ),
-        (40, 77, (1 << 53) - 1)
-    );
-    assert_eq!(draft.simulation().unwrap().scene.largest_compression, 0.125);
-    let Method::LevenbergMarquardt(settings) = draft.training.method else {
-        panic!("{draft:?}")
-    };
-    assert_eq!(settings.mu, 1e-4);
-    driver.wait("the new test set", |driver| driver.says("1 of 4"));
-
-    for (label, text) in [("Hidden nodes", "0"), ("Training samples", "-5"), ("Epochs", "0")] {
-        driver.enter(label, text);
-        assert_eq!(driver.state().draft, draft, "{text} {label} are rejected");
-    }
-    driver.enter("Hidden nodes", "a dozen");
-    assert_eq!(driver.state().draft.hidden, 17, "words are rejected");
     driver.settle();
 }
 
@@ -232,7 +183,7 @@ fn the_geometry_changes_the_surface_and_the_preset_brings_the_papers_settings_ba
             || driver.get("Actual surface").value().unwrap().contains("to 8")
     );
     driver.enter("Hidden nodes", "3");
-    driver.click_button("Paper");
+    driver.choose("Preset", "Paper");
     assert_eq!(driver.state().draft, RunSettings::default());
     driver.settle();
 }
@@ -244,11 +195,11 @@ fn changing_the_settings_hides_old_results_and_changing_them_back_restores_them(
     driver.train();
     let table = driver.table();
     assert!(!table.is_empty());
-    driver.click("10×8");
+    driver.choose("Paper's array", "10×8_4×24");
     driver.wait("the other array's surface", |driver| driver.state().preview.is_some());
     let networks = driver.table().into_iter().filter(|cell| cell.starts_with("network, "));
     assert!(networks.into_iter().all(|cell| cell.ends_with('–')) && !driver.has("Decoded surface"));
-    driver.click("10×6");
+    driver.choose("Paper's array", "10×6_3×18");
     assert_eq!(driver.table(), table);
     assert!(driver.has("Decoded surface"));
 
@@ -318,5 +269,5 @@ fn the_train_view_has_few_controls() {
     }
     driver.settle();
     let folded = count(&mut driver) - visible;
-    assert!(visible <= 42 && folded <= 44, "{visible} visible, {folded} folded");
+    assert!(visible <= 30 && folded <= 20, "{visible} visible, {folded} folded");
 }

@@ -111,7 +111,7 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
             }
         }
         let kept = run.leader_number() + 1;
-        expected.push(format!("Start {kept} is kept: it has the lowest {deciding}."));
+        expected.push(format!("Restart {kept} is kept: it has the lowest {deciding}."));
         opened.driver.assert_shows(&expected);
 
         opened.change(|settings| settings.starts = 1);
@@ -257,7 +257,7 @@ fn a_checkpoint_shows_the_wall_time_of_all_starts_or_none() {
         });
         driver.details();
         let texts = driver.texts();
-        for (name, value) in [("Training, all restarts", all), ("Time per epoch", an_epoch)] {
+        for (name, value) in [("Training time", all), ("Time per epoch", an_epoch)] {
             let place = texts.iter().rposition(|text| text == name).unwrap();
             assert_eq!(texts[place + 1], value, "{texts:#?}");
         }
@@ -333,7 +333,7 @@ fn levenberg_marquardt_continues_where_momentum_ended() {
         "the chart marks where the method changed"
     );
     assert!(!driver.says("previous settings"));
-    driver.click("Training state");
+    driver.show_chart("Training state");
     driver.settle();
     assert!(driver.says(" from epoch 15"));
 

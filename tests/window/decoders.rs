@@ -98,7 +98,7 @@ fn the_decoders_figures_are_the_librarys() {
     driver.settle();
 
     // The next training is measured automatically once it has ended.
-    driver.click_button("Known");
+    driver.choose("Rows", "Known");
     driver.enter("Relative noise", "0.1");
     assert_eq!(driver.state().draft, noisy());
     driver.train();

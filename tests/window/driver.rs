@@ -35,7 +35,14 @@ use crate::rasterise::Rasteriser;
 pub(crate) const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Parts of the configuration that are folded away at first.
-const FOLDED: [&str; 3] = ["Scene", "Samples", "Advanced"];
+const FOLDED: [&str; 6] = [
+    "Scene",
+    "Other noise",
+    "Samples",
+    "Advanced",
+    "Stopping and method",
+    "Geometry",
+];
 
 /// Label of the button that closes a notice.
 const DISMISS: &str = "Dismiss";
@@ -147,7 +154,7 @@ impl Driver {
 
     /// Chooses the paper's scene and waits for its surface.
     pub(crate) fn choose_papers_scene(&mut self) {
-        self.click("Paper");
+        self.choose("Preset", "Paper");
         self.get("Hidden nodes").scroll_to_me();
         self.wait("the paper's surface", |driver| {
             let preview = driver.state().preview.as_ref();
@@ -359,6 +366,17 @@ impl Driver {
         self.harness.step();
     }
 
+    /// Shows a chart of the Train view: a tab, or one of the list beside the tabs.
+    #[track_caller]
+    pub(crate) fn show_chart(&mut self, name: &str) {
+        let tab = By::new().role(Role::Tab).label(name);
+        let is_tab = self.harness.query_all(tab).next().is_some();
+        match is_tab {
+            true => self.click(name),
+            false => self.choose("More charts", name),
+        }
+    }
+
     #[track_caller]
     fn click_by(&mut self, by: &By<'_>) {
         self.harness.get(by.clone()).scroll_to_me();
@@ -565,8 +583,8 @@ impl Driver {
 
     /// Configures a small network on the smallest array of the paper, which is trained quickly.
     pub(crate) fn configure_small(&mut self) {
-        self.click("Paper");
-        self.click("10×6");
+        self.choose("Preset", "Paper");
+        self.choose("Paper's array", "10×6_3×18");
         self.enter("Hidden nodes", "6");
         self.enter("Training samples", "200");
         self.enter("Epochs", "15");

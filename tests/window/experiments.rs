@@ -13,7 +13,8 @@ use decoupler_files::export::{Cell, ExperimentTable, describe_failures, describe
 
 use crate::{
     driver::Driver,
-    recordings::{opened, plan, trained},
+    recordings::{opened, setup},
+    sources::run_of,
     terminal,
 };
 
@@ -67,7 +68,7 @@ fn by_library(experiment: &Experiment) -> ExperimentResults {
 }
 
 /// Columns of times differ from run to run.
-const TIMES: [&str; 1] = ["training (s)"];
+const TIMES: [&str; 1] = ["training time (s)"];
 
 #[test]
 fn a_table_ends_with_the_librarys_own_numbers() {
@@ -342,7 +343,7 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     driver.type_into("Values across", "4 12");
     driver.enter("Epochs", "5");
     run_to_the_end(&mut driver);
-    let alone = trained(&plan(&path));
+    let alone = run_of(&setup(&path));
     let percent = decoupler_files::export::format_number(alone.errors().percent());
     let label = format!("12, minmax, error % median: {percent}");
     driver.assert_has(&label);

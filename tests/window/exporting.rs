@@ -255,6 +255,7 @@ fn the_menu_says_in_each_view_why_nothing_can_be_exported_yet() {
         driver.press(Key::Escape);
         assert!(!driver.has(reason), "{view}: the menu is closed");
     }
+    driver.assert_says("Every finished training is kept here");
 }
 
 #[test]

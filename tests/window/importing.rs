@@ -6,16 +6,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler::window::{Notice, Phase, SourceKind};
+use decoupler::window::{Phase, SourceKind};
 use decoupler_core::{network::ScalingChoice, scene::RowModel};
-use decoupler_files::export::{NetworkFile, RecipeFile};
-use eframe::egui::{self, accesskit::Role, vec2};
+use decoupler_files::export::NetworkFile;
+use eframe::egui::{self, Rect, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::{
     driver::Driver,
     habits::pause,
-    recordings::{opened, opened_text, plan, recording, settings, trained, written},
+    recordings::{opened, opened_text, recording, setup, written},
+    sources::run_of,
 };
 
 #[track_caller]
@@ -53,8 +54,8 @@ fn a_dropped_file_is_trained_on_with_one_click_as_by_the_library() {
     driver.limit_epochs("5");
     // From here on one click is enough.
     driver.train_recording();
-    let run = trained(&plan(&path));
-    assert_eq!(driver.state().run.as_ref().unwrap().settings(), &settings());
+    let run = run_of(&setup(&path));
+    assert_eq!(driver.state().run.as_ref().unwrap().settings(), setup(&path).settings());
     assert_eq!(driver.state().result().unwrap().errors, run.errors());
     // The results replace the columns, which a button brings back.
     assert!(!driver.has("Meaning of u1"));
@@ -126,16 +127,20 @@ fn the_source_selects_the_form_and_keeps_the_settings_of_the_other() {
     driver.click_button("Recording");
     assert!(!driver.has("Array scale") && driver.has("Drop recordings here"));
     assert_eq!(driver.state().settings().hidden, 12);
-    driver.click("▶ Train");
-    assert!(
-        matches!(driver.notice(), Some(Notice::Failed(reason)) if reason.contains("Open a recording first")),
-        "{:?}",
-        driver.notice()
+    // Train is not possible yet; the reason is next to it.
+    assert!(!driver.is_enabled("▶ Train"));
+    let (reason, train) = (
+        "Open a recording first: drop files on the window.",
+        driver.get("▶ Train").rect(),
     );
+    let texts = driver.harness().get_all_by_label(reason);
+    let places = Vec::from_iter(texts.map(|text| text.rect()));
+    let is_next_to_it = |place: &Rect| train.y_range().contains(place.center().y) && place.right() <= train.left();
+    assert!(places.iter().any(is_next_to_it), "{places:?}");
     driver.choose_by_hand();
     driver.enter("Hidden nodes", "5");
-    driver.unfold_to("Advanced", "Whitening");
-    driver.click_button("Whitening");
+    driver.unfold_to("Advanced", "Scaling");
+    driver.choose("Scaling", "Whitening");
     driver.settle();
     let chosen = driver.state().settings();
     assert_eq!((chosen.hidden, chosen.inputs.scaling), (5, ScalingChoice::Whitening));
@@ -290,6 +295,34 @@ fn undo_restores_a_meaning() {
 }
 
 #[test]
+fn cleared_files_are_brought_back_with_a_click_where_clear_was() {
+    let (mut driver, path, _folder) = opened(40);
+    driver.mean("y", "unused");
+    pause(&mut driver);
+    let plan = |driver: &Driver| driver.state().setup().map(|setup| setup.plan().cloned());
+    let before = plan(&driver);
+    let place = driver.get("Clear").rect();
+    driver.click_button("Clear");
+    driver.settle();
+    assert!(plan(&driver).is_err() && driver.has("Drop recordings here"));
+    assert_eq!(driver.get("Undo: Clear").rect().left_top(), place.left_top());
+    driver.click_button("Undo: Clear");
+    driver.wait("the samples", |driver| driver.says("Test: "));
+    assert_eq!(plan(&driver), before);
+    assert_meanings(&driver, &[("y", "unused")]);
+
+    // So does undoing by the keyboard; closing the last file is the same.
+    pause(&mut driver);
+    driver.click(&format!("Close {}", path.file_name().unwrap().display()));
+    pause(&mut driver);
+    assert!(driver.has("Undo: Clear"));
+    driver.press_with(egui::Modifiers::COMMAND, egui::Key::Z);
+    driver.wait("the samples", |driver| driver.says("Test: "));
+    assert!(driver.says("Undone: Clear"), "{:?}", driver.notice());
+    assert_eq!(plan(&driver), before);
+}
+
+#[test]
 fn row_wires_offer_a_network_for_each_and_without_them_there_is_one() {
     let mut text = "row,u,v,force (N)\n".to_owned();
     for row in 0..60 {
@@ -298,14 +331,14 @@ fn row_wires_offer_a_network_for_each_and_without_them_there_is_one() {
     }
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.mean("row", "row-wire");
-    driver.unfold_to("Advanced", "Known");
-    driver.click_button("Known");
+    driver.unfold_to("Advanced", "Rows");
+    driver.choose("Rows", "Known");
     driver.settle();
     assert_eq!(driver.state().settings().source.row_model(), RowModel::Each);
     driver.mean("row", "unused");
     driver.settle();
     assert_eq!(driver.state().settings().source.row_model(), RowModel::Shared);
-    assert!(!driver.has("Known"));
+    assert!(!driver.has("Rows"));
 }
 
 #[test]
@@ -385,17 +418,9 @@ fn two_files_are_joined_by_time_and_filtered() {
     driver.wait("the filtered samples", |driver| driver.says("states.c3<3 is not met"));
     driver.wait("the samples", |driver| driver.has("Test: 11"));
     assert!(driver.has("Training: 42"), "53 of 70 rows are left");
-
-    // The import is saved as a recipe, which the terminal reads too, and opened again.
-    let recipe = folder.path().join("recipe.json");
-    driver.save("Recipe, JSON", &recipe);
-    let plan = RecipeFile::load_recording(&recipe).unwrap();
+    let plan = driver.plan();
     assert_eq!(plan.import.targets, ["states.c2"]);
     assert_eq!(plan.import.conditions[0].to_string(), "states.c3<3");
-    let mut other = Driver::open();
-    other.open_recordings(&[&recipe]);
-    assert!(other.has("Training: 42") && other.has("Test: 11"));
-    assert_meanings(&other, &[("states.c3", "unused")]);
 }
 
 #[test]
@@ -432,10 +457,12 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
 fn a_random_split_is_reported_as_optimistic() {
     let (mut driver, _path, _folder) = opened(40);
     assert!(!driver.says("A random split is optimistic"));
-    driver.unfold_to("Samples", "random");
-    driver.click_button("random");
+    driver.unfold_to("Samples", "Split by");
+    driver.choose("Split by", "random");
     driver.settle();
     assert!(driver.says("A random split is optimistic"));
+    driver.click("Split by");
+    driver.settle();
     let group = By::new().role(Role::Button).label("group");
     assert!(
         driver.harness().query(group).is_none(),
@@ -453,6 +480,11 @@ fn a_column_of_groups_divides_the_samples_by_them() {
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.assert_says("group, 20 % test");
     assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
+    // Whole sessions are another share than the one asked for.
+    driver.unfold_to("Samples", "Test share");
+    driver.enter("Test share", "30");
+    driver.wait("two sessions", |driver| driver.says("group, 40 % test"));
+    driver.enter("Test share", "20");
     // Another group replaces it, and without one the samples are divided by time.
     driver.mean("u", "group");
     assert_meanings(&driver, &[("session", "unused")]);

@@ -48,7 +48,7 @@ fn an_idle_window_draws_nothing() {
 #[test]
 fn buttons_react_to_the_pointer() {
     let mut driver = Driver::open();
-    for (button, next_theme) in [("▶ Train", "Light theme"), ("Best accuracy", "Dark theme")] {
+    for (button, next_theme) in [("▶ Train", "Light theme"), ("Recording", "Dark theme")] {
         // Inside the edge, next to the text.
         let place = driver.get(button).rect().left_center() + vec2(3.0, 0.0);
         let colour = |driver: &mut Driver| {

@@ -48,11 +48,11 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
     assert!(at_rest > 40 && deepest_mm > 0.2, "{at_rest} at rest, {deepest_mm} mm");
 
-    driver.click("Paper");
+    driver.choose("Preset", "Paper");
     assert_eq!(driver.state().draft, RunSettings::default());
     driver.wait("the published errors", |driver| driver.has("Published"));
     shows_the_baselines_of(&driver, RunSettings::default());
-    driver.click("Press demo");
+    driver.choose("Preset", "Press demo");
     assert_eq!(driver.state().draft, opened);
 }
 
@@ -119,7 +119,7 @@ fn every_term_has_the_same_text_in_the_glossary_and_as_a_tooltip() {
     driver.harness().hover_at(place);
     driver.harness().run_steps(60);
     const DEFINITION: &str = "Mean |error| of z in percent of the full scale, the distance a node can travel.";
-    const EQUATION: &str = "100 · mean(|decoupled z − z|) / stroke";
+    const EQUATION: &str = "100 · mean(|decoded z − z|) / stroke";
     assert!(
         driver.says(DEFINITION) && driver.says(EQUATION),
         "under the pointer: {:#?}",
@@ -156,29 +156,6 @@ fn the_list_of_actions_finds_terms_too() {
     let mut driver = open_first();
     driver.act("pareto");
     driver.assert_says("no other is both faster and more accurate");
-}
-
-#[test]
-fn empty_views_fill_on_a_click() {
-    let mut driver = Driver::open();
-    driver.configure_small();
-    driver.click_button("Compare");
-    assert!(driver.says("Every finished training is kept here"));
-    driver.click_button("Study");
-    driver.settle();
-    assert!(driver.is_enabled("▶ Run"));
-    driver.click("Speed against accuracy");
-    driver.settle();
-    assert!(driver.is_enabled("▶ Run"));
-    driver.click_button("Train");
-    driver.settle();
-    driver.click("▶ Train");
-    driver.wait_for_end();
-    driver.click_button("Study");
-    driver.click("Table 1");
-    driver.click_button("▶ Run");
-    driver.wait("the experiment", |driver| driver.is_enabled("■ Cancel"));
-    driver.click("■ Cancel");
 }
 
 #[test]

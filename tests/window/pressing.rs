@@ -244,8 +244,8 @@ fn a_newcomer_presses_before_any_training_and_a_demo_network_answers() {
 #[test]
 fn the_demo_network_is_useful_on_every_array_of_the_paper() {
     let mut driver = Driver::open();
-    for (array, columns) in [("10×6", 18), ("10×8", 24), ("10×10", 30)] {
-        driver.click(array);
+    for (array, columns) in [("10×6_3×18", 18), ("10×8_4×24", 24), ("10×10_5×30", 30)] {
+        driver.choose("Paper's array", array);
         driver.wait("its surface", |driver| {
             let skin = driver.state().skin();
             skin.is_some_and(|skin| skin.sensor.scale.columns() == columns)

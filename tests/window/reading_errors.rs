@@ -55,7 +55,7 @@ fn a_node_lit_on_a_surface_is_lit_in_the_charts_and_the_readings() {
     let found = hover_a_node(&mut driver, surface.center() - vec2(60.0, 0.0), vec2(3.0, 2.0), 40);
     let (node, _) = found.expect("a node under the pointer");
     for (tab, halo) in [("Nodes", "1 point of lit"), ("Regression", "lit: ")] {
-        driver.click(tab);
+        driver.show_chart(tab);
         let place = driver.get("Decoded surface").rect();
         let again = hover_a_node(&mut driver, place.center() - vec2(60.0, 0.0), vec2(3.0, 2.0), 40);
         assert!(again.is_some(), "{tab}");
@@ -69,7 +69,7 @@ fn a_node_lit_on_a_surface_is_lit_in_the_charts_and_the_readings() {
 #[test]
 fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
     let mut driver = trained();
-    driver.click("Nodes");
+    driver.show_chart("Nodes");
     driver.settle();
     let plot = plot_place(&mut driver, "z (mm) against node");
     let drawn = driver.views().train.drawing().unwrap();
@@ -108,13 +108,13 @@ fn a_section_follows_keys_clicks_and_the_readings_and_is_exported() {
     let words = |driver: &mut Driver| description(driver, Role::Image, "along ");
     let first = words(&mut driver);
     assert!(first.contains("y along row-wire 6 (mm): actual from"), "{first}");
-    assert!(first.contains("; decoupled from "), "{first}");
+    assert!(first.contains("; decoded from "), "{first}");
     driver.press(Key::CloseBracket);
     assert!(words(&mut driver).contains("row-wire 7"));
     driver.press(Key::OpenBracket);
     driver.press(Key::OpenBracket);
     assert!(words(&mut driver).contains("row-wire 5"));
-    driver.click("Previous section");
+    driver.enter("Wire of the section", "4");
     assert!(words(&mut driver).contains("row-wire 4"));
     driver.press(Key::Backslash);
     assert!(words(&mut driver).contains("x along column-wire"));

@@ -7,13 +7,8 @@ use std::{
 };
 
 use decoupler::window::Phase;
-use decoupler_core::{
-    dataset::{Division, Seed},
-    evaluation::{Run, RunSets, RunSettings},
-    job::Job,
-    scene::RowModel,
-};
-use decoupler_files::import::{Plan, Recipe};
+use decoupler_core::{evaluation::RunSettings, scene::RowModel};
+use decoupler_files::import::{Plan, Recipe, Setup};
 use eframe::egui::{self, accesskit::Role};
 use egui_kittest::kittest::{By, Queryable as _};
 use tempfile::TempDir;
@@ -129,37 +124,26 @@ pub(crate) fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {
     path
 }
 
-/// Returns the plan that the window suggests for [`recording`].
-pub(crate) fn plan(path: &Path) -> Plan {
+/// The import that the window suggests for [`recording`], or for its columns in another file.
+pub(crate) fn plan(path: &Path, targets: &[&str]) -> Plan {
     let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     Plan {
         import: Recipe {
             data: path.to_owned(),
             inputs: names(&["u1", "u2"]),
-            targets: names(&["x", "y"]),
+            targets: names(targets),
             time: Some("time".to_owned()),
             ..Recipe::default()
         },
-        division: Division::default(),
         ..Plan::default()
     }
 }
 
-/// The library's settings for measured samples, with five epochs.
-pub(crate) fn settings() -> RunSettings {
+/// What the window trains on [`recording`] with five epochs.
+pub(crate) fn setup(path: &Path) -> Setup {
     let mut settings = RunSettings::measured(RowModel::Shared);
     settings.training.stopping.epochs = 5;
-    settings
-}
-
-/// Returns the run of the library on the plan with these settings.
-pub(crate) fn trained(plan: &Plan) -> Run {
-    let watch = &mut |_| std::ops::ControlFlow::Continue(());
-    let (recording, test) = plan.recordings(Path::new(""), watch).unwrap();
-    let (split, test) = plan.divide(&recording, test.as_ref(), Seed::default()).unwrap();
-    let mut run = Run::with_baselines(settings(), RunSets::new(split, test), None, &Job::UNINTERRUPTED).unwrap();
-    while run.step().is_none() {}
-    run
+    Setup::recording(settings, plan(path, &["x", "y"]))
 }
 
 /// Returns a window with [`recording`] open, its file, and the folder of the file.

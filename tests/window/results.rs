@@ -138,7 +138,7 @@ fn without_positions_all_targets_are_shown_over_time_and_errors_over_a_position(
     driver.click_button("y (mm)");
     driver.settle();
     assert!(driver.says("decoded y (mm) against actual y (mm)"));
-    driver.click("Histogram");
+    driver.show_chart("Histogram");
     driver.settle();
     assert!(driver.says("error of y (mm), decoded − actual"));
     // A force has no map.

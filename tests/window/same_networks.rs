@@ -24,7 +24,7 @@ fn configure(driver: &mut Driver, options: &str) {
         };
         let percent = || (100.0 * value.parse::<f64>().unwrap()).to_string();
         match (option, value) {
-            ("--preset", "best") => driver.click_button("Best accuracy"),
+            ("--preset", "best") => driver.choose("Preset", "Best accuracy"),
             ("--array", scale) => driver.enter("Array scale", scale),
             ("--epochs", epochs) => driver.enter("Epochs", epochs),
             ("--samples", samples) => driver.enter("Training samples", samples),
@@ -32,12 +32,12 @@ fn configure(driver: &mut Driver, options: &str) {
             ("test-samples", samples) => driver.enter("Test samples", samples),
             ("--hidden", hidden) => driver.enter("Hidden nodes", hidden),
             ("--seed", seed) => driver.enter("Seed", seed),
-            ("--rows", "known") => driver.click_button("Known"),
+            ("--rows", "known") => driver.choose("Rows", "Known"),
             ("--rows", row) => {
-                driver.click_button("One");
+                driver.choose("Rows", "One");
                 driver.enter("Row", row);
             }
-            ("--axes", _) => driver.click_button("x, y, z"),
+            ("--axes", _) => driver.choose("Axes", "x, y, z"),
             ("--loading", "indenter") => driver.choose("Loading", "Indenter"),
             ("--loading", smooth) => {
                 driver.choose("Loading", "Smooth field");
@@ -47,15 +47,14 @@ fn configure(driver: &mut Driver, options: &str) {
             ("drift", _) => driver.enter("Drift", &percent()),
             ("noise-ohm", ohm) => driver.enter("Additive noise", ohm),
             ("adc-bits", bits) => driver.enter("Converter bits", bits),
-            ("noise-in", "test") => driver.click_button("Test"),
+            ("noise-in", "test") => driver.choose("Noise in", "Test"),
             ("--inputs", "conductance") => driver.choose("Inputs", "Conductance"),
             ("--inputs", "log") => driver.choose("Inputs", "Log-resistance"),
-            ("--scaling", "whiten") => driver.click_button("Whitening"),
+            ("--scaling", "whiten") => driver.choose("Scaling", "Whitening"),
             ("--method", method) => choose_method(driver, method_name(method)),
             ("--starts", starts) => driver.enter("Restarts", starts),
             ("combine", "mean") => {
-                driver.click("Combine restarts");
-                driver.click_button("average their answers");
+                driver.choose("Combine restarts", "average their answers");
             }
             ("--sensor", "tiny.json") => driver.enter("Resistivity", "1e-12"),
             ("--sensor", "huge.json") => driver.enter("Resistivity", "1e12"),
@@ -105,7 +104,7 @@ fn without_times(value: &mut Value) {
 /// Trains in the terminal with these options.
 #[track_caller]
 fn train_in_terminal(options: &str, folder: &Path) -> Value {
-    let output = decoupler(&format!("train {options} --out terminal.json"), folder);
+    let output = decoupler(&format!("train {options} --decoder mean --out terminal.json"), folder);
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{options}: {message}");
     run_of(&folder.join("terminal.json"))
@@ -134,7 +133,7 @@ fn check_arrays(configurations: &[&str]) {
         let options = format!("{options} {}", if options.contains("--hidden") { "" } else { ARRAY });
         let terminal = train_in_terminal(&options, folder.path());
         // Nothing is left of the configuration before.
-        driver.click_button("Paper");
+        driver.choose("Preset", "Paper");
         configure(&mut driver, &options);
         if options.contains("--sensor") {
             driver.enter("Array scale", "4x3_2x9");

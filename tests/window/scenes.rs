@@ -32,7 +32,7 @@ fn known_rows_train_one_small_network_for_each_row() {
     let mut driver = Driver::open();
     driver.configure_small();
     assert!(driver.has("18 inputs, 12 outputs, 198 weights"));
-    driver.click_button("Known");
+    driver.choose("Rows", "Known");
     // (18 + 1) · 6 + (6 + 1) · 6: x of a known row does not vary.
     assert!(driver.has("10 networks of 18 inputs, 6 outputs and 156 weights: 1560 in total"));
     driver.train();
@@ -44,7 +44,7 @@ fn known_rows_train_one_small_network_for_each_row() {
 fn with_one_row_only_that_row_is_drawn() {
     let mut driver = Driver::open();
     driver.configure_small();
-    driver.click_button("One");
+    driver.choose("Rows", "One");
     driver.enter("Row", "4");
     assert_eq!(driver.simulation().scene.rows, Rows::One(3));
     wait_for_scene(&mut driver);
@@ -74,7 +74,7 @@ fn a_training_with_noise_is_compared_with_the_limit_that_noise_sets() {
     assert!(!driver.has("Published"), "the paper's figures are of another scene");
     driver.enter("Training samples", "2000");
     driver.enter("Epochs", "40");
-    driver.click_button("Whitening");
+    driver.choose("Scaling", "Whitening");
     wait_for_scene(&mut driver);
     driver.train();
     let mut settings = small();
@@ -143,11 +143,11 @@ fn only_the_settings_of_the_current_choices_are_shown() {
     });
     assert_eq!(indenter.shape, punch, "the largest radius follows the smallest");
     driver.choose("Loading", "Random nodes");
-    driver.click_button("One");
-    driver.click_button("x, y, z");
+    driver.choose("Rows", "One");
+    driver.choose("Axes", "x, y, z");
     shows(&driver, &["Row", "Largest shift"]);
-    driver.click_button("All");
-    driver.click_button("z");
+    driver.choose("Rows", "All");
+    driver.choose("Axes", "z");
     assert_eq!(driver.state().draft, RunSettings::default());
     wait_for_scene(&mut driver);
     driver.settle();
@@ -178,11 +178,11 @@ fn a_shape_from_a_file_that_is_not_offered_is_shown_and_kept() {
 #[test]
 fn the_best_accuracy_sets_how_readings_are_decoded_and_the_paper_all_but_the_array() {
     let mut driver = Driver::open();
-    driver.click("10×6");
+    driver.choose("Paper's array", "10×6_3×18");
     driver.enter("Hidden nodes", "7");
-    driver.click_button("x, y, z");
+    driver.choose("Axes", "x, y, z");
     let before = driver.state().draft;
-    driver.click_button("Best accuracy");
+    driver.choose("Preset", "Best accuracy");
     let draft = driver.state().draft;
     let best = Preset::Best.settings();
     assert_eq!(
@@ -216,7 +216,7 @@ fn the_best_accuracy_sets_how_readings_are_decoded_and_the_paper_all_but_the_arr
     driver.enter("Relative noise", "0.1");
     assert_eq!(driver.simulation().samples, 300);
     driver.enter("Relative noise", "0");
-    driver.click_button("Paper");
+    driver.choose("Preset", "Paper");
     let mut papers = RunSettings::default();
     papers.simulation_mut().unwrap().sensor.scale = ArrayScale::PRESETS[0];
     assert_eq!(driver.state().draft, papers);
@@ -228,7 +228,7 @@ fn scenes_that_move_sideways_are_reported_as_ill_conditioned() {
     let mut driver = Driver::open();
     driver.configure_small();
     assert!(!driver.says("ill-conditioned"));
-    driver.click_button("x, y, z");
+    driver.choose("Axes", "x, y, z");
     wait_for_scene(&mut driver);
     assert!(driver.says("even rounding hides it"));
     driver.train();
@@ -245,7 +245,7 @@ fn scenes_that_move_sideways_are_reported_as_ill_conditioned() {
         );
     }
     for tab in ["Nodes", "Histogram", "Regression"] {
-        driver.click(tab);
+        driver.show_chart(tab);
         driver.settle();
     }
     driver.click_button("Error");

@@ -67,7 +67,7 @@ fn a_replay_goes_through_the_epochs_on_every_chart_and_ends_on_the_latest() {
         } = trained_small(source);
         let last = driver.epochs();
         for chart in ["Loss", "Training state", "Histogram", "Regression"] {
-            driver.click(chart);
+            driver.show_chart(chart);
             driver.settle();
             driver.click_button("Replay the training");
             assert!(driver.has("Stop the replay"), "{source:?}, {chart}");

@@ -78,7 +78,7 @@ fn the_array_is_that_of_the_train_view_and_the_figures_are_the_librarys() {
 #[test]
 fn rows_that_mirror_each_other_are_reported_until_the_row_is_known() {
     let mut driver = Driver::open();
-    driver.click("10×6");
+    driver.choose("Paper's array", "10×6_3×18");
     driver.click_button("Sensor");
     wait_for_the_answer(&mut driver);
     assert!(!driver.says("cannot be told apart"));
@@ -86,7 +86,7 @@ fn rows_that_mirror_each_other_are_reported_until_the_row_is_known() {
     driver.enter("First column node at x", "7.5");
     wait_for_the_answer(&mut driver);
     driver.assert_says("cannot be told apart");
-    driver.click_button("Known");
+    driver.choose("Rows", "Known");
     wait_for_the_answer(&mut driver);
     assert!(!driver.says("cannot be told apart"));
     assert!(driver.has("Most similar rows: the row is known"));
@@ -112,7 +112,7 @@ fn noise_that_hides_everything_is_reported_with_a_remedy() {
 #[test]
 fn sideways_movement_has_a_picture_for_each_axis() {
     let mut driver = open();
-    driver.click_button("x, y, z");
+    driver.choose("Axes", "x, y, z");
     wait_for_the_answer(&mut driver);
     assert!(driver.has("Unknowns of a row: 30"));
     let along_z = driver.get("Worst-seen deformation of each row").value();

@@ -4,18 +4,17 @@ use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 
 use decoupler::window::{Effect, SourceKind};
 use decoupler_core::{
-    dataset::Division,
     evaluation::{ErrorMeasure, Run, RunSettings},
     job::Job,
     scene::RowModel,
 };
-use decoupler_files::{
-    export::format_number,
-    import::{Plan, Recipe, Setup},
-};
+use decoupler_files::{export::format_number, import::Setup};
 use tempfile::TempDir;
 
-use crate::driver::{Driver, small};
+use crate::{
+    driver::{Driver, small},
+    recordings::{plan, recording},
+};
 
 /// Both kinds of source.
 pub(crate) const BOTH: [SourceKind; 2] = [SourceKind::Array, SourceKind::Recording];
@@ -65,14 +64,7 @@ pub(crate) fn small_settings() -> RunSettings {
 
 /// A recording of two readings and the position of a probe, written into `folder`.
 pub(crate) fn probe(folder: &Path) -> Setup {
-    let mut text = "time (s),u1 (V),u2 (V),x (mm),y (mm)\n".to_owned();
-    for row in 0..120 {
-        let t = f64::from(row);
-        let (x, y) = (10.0 + 5.0 * (0.37 * t).sin(), 4.0 * (0.23 * t).cos());
-        let (u1, u2) = (0.2 * x + 0.05 * y + 0.01 * x * y / 40.0, 0.3 * y - 0.02 * x);
-        writeln!(text, "{},{u1:.6},{u2:.6},{x:.6},{y:.6}", 0.1 * t).unwrap();
-    }
-    setup(folder, "probe.csv", &text, &["x", "y"])
+    setup(folder, "probe.csv", &recording(120), &["x", "y"])
 }
 
 /// A recording of two readings, the presses on 2 × 3 taxels, and the force.
@@ -112,19 +104,7 @@ pub(crate) fn skin_with_positions(folder: &Path, positions: &str) -> Setup {
 fn setup(folder: &Path, name: &str, text: &str, targets: &[&str]) -> Setup {
     let path = folder.join(name);
     fs::write(&path, text).unwrap();
-    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
-    let plan = Plan {
-        import: Recipe {
-            data: path,
-            inputs: names(&["u1", "u2"]),
-            targets: names(targets),
-            time: Some("time".to_owned()),
-            ..Recipe::default()
-        },
-        division: Division::default(),
-        ..Plan::default()
-    };
-    Setup::recording(small_settings(), plan)
+    Setup::recording(small_settings(), plan(&path, targets))
 }
 
 /// Returns a run of the library that has begun.

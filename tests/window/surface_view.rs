@@ -176,12 +176,3 @@ fn odd_inputs_are_drawn() {
         }
     }
 }
-
-#[test]
-fn nothing_is_repainted_while_nothing_changes() {
-    let surface = Skin::pressed(10, 10).surface("Actual", Quantity::Height, ViewMode::ThreeD);
-    let mut harness = harness(vec2(350.0, 540.0), true, |ui| {
-        view(&surface, &SurfaceFigure::default()).show(ui);
-    });
-    assert!(harness.run() <= 2);
-}

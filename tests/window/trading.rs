@@ -24,7 +24,7 @@ const OPEN: &str = "Open in Train view";
 
 fn open() -> Driver {
     let mut driver = Driver::open();
-    driver.click("10×6");
+    driver.choose("Paper's array", "10×6_3×18");
     driver.click_button("Study");
     driver.click(TOPIC);
     driver

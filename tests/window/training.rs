@@ -37,7 +37,7 @@ fn a_training_ends_with_the_librarys_own_numbers() {
 #[test]
 fn published_errors_are_listed_where_the_paper_has_them() {
     let mut driver = Driver::open();
-    driver.click("10×6");
+    driver.choose("Paper's array", "10×6_3×18");
     driver.enter("Epochs", "1");
     driver.train();
     // Table 3 of the paper: 10×6_3×18 with 12 hidden nodes and 1000 samples.
@@ -66,7 +66,7 @@ fn published_errors_are_listed_where_the_paper_has_them() {
 fn every_picture_of_a_trained_network_can_be_displayed() {
     let mut driver = Driver::open();
     for tab in TABS {
-        driver.click(tab);
+        driver.show_chart(tab);
         driver.settle();
     }
     driver.configure_small();
@@ -88,7 +88,7 @@ fn every_picture_of_a_trained_network_can_be_displayed() {
     assert_eq!(driver.state().look.mode, ViewMode::ThreeD);
 
     for tab in TABS {
-        driver.click(tab);
+        driver.show_chart(tab);
         driver.settle();
     }
     driver.click("Regression");
@@ -250,7 +250,7 @@ fn a_diverging_training_says_so_and_shows_no_infinities() {
     assert!(!driver.says("Train for more epochs"), "more of the same would not help");
     assert!(!driver.has("Train longer"));
     for tab in TABS {
-        driver.click(tab);
+        driver.show_chart(tab);
         driver.settle();
         for text in driver.texts() {
             let words = text.split(|letter: char| !letter.is_alphanumeric());

@@ -58,7 +58,7 @@ fn invalid_values_are_rejected_in_place_and_the_old_value_stays() {
 fn a_notice_above_a_field_does_not_interrupt_typing() {
     let mut driver = Driver::open();
     driver.enter("Array scale", "20×20_5×60");
-    driver.click_button("x, y, z");
+    driver.choose("Axes", "x, y, z");
     driver.type_into("Training samples", "300");
     // The notes on this scene appear above the field during typing.
     driver.wait("the scene's outlook", |driver| {

@@ -27,8 +27,8 @@ use super::{
     theme::space,
     widgets::{
         fields::{
-            capitalised, combo_ui, count_ui, field_ui, in_percent, input_text, list_ui, options_ui, percent_ui,
-            quantity_ui, seed_ui, usually,
+            capitalised, combo_ui, count_ui, field_ui, in_percent, input_text, list_ui, percent_ui, quantity_ui,
+            seed_ui, usually,
         },
         fold_ui,
     },
@@ -64,8 +64,6 @@ pub struct Row(&'static str, &'static str, Look);
 pub enum Look {
     /// Number with this unit; a fraction of one if that is %.
     Number(&'static str),
-    /// A few options side by side.
-    Options(&'static [Choice]),
     /// Drop-down list.
     List(&'static [Choice]),
     /// Drop-down list below the name, for texts that fill a line.
@@ -131,7 +129,10 @@ pub fn advanced_ui(
         });
         training::training_ui(ui, fields, is_new);
         if let Some(simulation) = fields.settings.simulation_mut() {
-            ui.add_enabled_ui(is_new, |ui| geometry_ui(ui, &mut simulation.sensor));
+            let summary = format!("height {} mm", input_text(simulation.sensor.geometry.height_mm));
+            fold_ui(ui, "Geometry", &summary, |ui| {
+                ui.add_enabled_ui(is_new, |ui| geometry_ui(ui, &mut simulation.sensor));
+            });
         }
     });
 }
@@ -145,7 +146,7 @@ impl Row {
     fn choices(&self) -> Vec<Choice> {
         match self.2 {
             Look::Number(_) => Vec::new(),
-            Look::Options(choices) | Look::List(choices) => choices.to_vec(),
+            Look::List(choices) => choices.to_vec(),
             Look::Below(choices) => choices(),
         }
     }
@@ -182,7 +183,6 @@ impl Row {
         let listed = choices.iter().find(|(name, ..)| kind(name) == kind(&value));
         let selected = listed.map_or("", |(name, ..)| *name);
         let picked = match look {
-            Look::Options(_) => options_ui(ui, label, hint, &choices, selected),
             Look::List(_) => list_ui(ui, label, hint, &choices, selected),
             _ => {
                 let (named, width) = (ui.label(label).on_hover_text(hint), ui.available_width());

@@ -11,7 +11,7 @@ use eframe::egui::{RichText, Ui};
 use super::{Fields, Look, Row, SetBy};
 use crate::window::{
     theme::{Theme, type_size},
-    widgets::{dim_ui, fields::capitalised, section_heading_ui},
+    widgets::{dim_ui, fields::capitalised},
 };
 
 const HIDDEN: Row = Row("hidden", "Hidden nodes", Look::Number(""));
@@ -29,7 +29,7 @@ pub(super) const INPUTS: [Row; 2] = [
     Row(
         "scaling",
         "Scaling",
-        Look::Options(&[("minmax", "Min-max"), ("whiten", "Whitening")]),
+        Look::List(&[("minmax", "Min-max"), ("whiten", "Whitening")]),
     ),
 ];
 
@@ -37,7 +37,7 @@ pub(super) const INPUTS: [Row; 2] = [
 pub(super) const ROWS: Row = Row(
     "rows",
     "Rows",
-    Look::Options(&[("all", "All"), ("known", "Known"), ("1", "One")]),
+    Look::List(&[("all", "All"), ("known", "Known"), ("1", "One")]),
 );
 
 /// Hidden nodes, with the rules of thumb for these numbers of inputs and outputs.
@@ -71,7 +71,6 @@ pub fn workload_ui(ui: &mut Ui, settings: &RunSettings, size: TrainingSize) {
 
 /// Quantity and scaling of the inputs, rows of a recording that has several, and the size of the network.
 pub(super) fn inputs_ui(ui: &mut Ui, fields: &mut Fields<'_>, has_recorded_rows: bool, size: Option<TrainingSize>) {
-    section_heading_ui(ui, "Network inputs");
     fields.show(ui, &INPUTS);
     if has_recorded_rows {
         ROWS.ui(ui, fields.settings, &fields.usual);

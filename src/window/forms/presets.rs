@@ -1,4 +1,4 @@
-//! Presets of a simulated array, one click each.
+//! Presets of a simulated array.
 
 use decoupler_core::{
     dataset::Simulation,
@@ -7,7 +7,7 @@ use decoupler_core::{
 };
 use eframe::egui::Ui;
 
-use crate::window::{shared::opening_settings, theme::space, widgets::explained_options_ui};
+use crate::window::{shared::opening_settings, widgets::fields::list_ui};
 
 /// Returns the settings with those of a preset; the scale of the array is kept.
 type Change = fn(&RunSettings) -> RunSettings;
@@ -35,13 +35,11 @@ const PRESETS: [(&str, &str, Change); 3] = [
     ),
 ];
 
-/// The presets.
+/// The list of presets.
 pub fn preset_ui(ui: &mut Ui, settings: &mut RunSettings) {
-    let places = PRESETS.map(|(name, hint, change)| (change(settings), name, hint));
-    if let Some(picked) = explained_options_ui(ui, "Preset", &places, *settings, true) {
-        *settings = picked;
-    }
-    ui.add_space(space(2));
+    let presets = PRESETS.map(|(name, hint, change)| (change(settings), name, hint));
+    let hint = "Settings that go together. Each can be changed afterwards.";
+    *settings = list_ui(ui, "Preset", hint, &presets, *settings).unwrap_or(*settings);
 }
 
 fn with_scale_of(settings: &RunSettings, mut preset: RunSettings) -> RunSettings {

@@ -12,7 +12,7 @@ use crate::window::{
     glossary,
     widgets::{
         fields::{capitalised, count_ui, in_percent, input_text, list_ui, percent_ui, quantity_ui},
-        section_heading_ui,
+        fold_ui, section_heading_ui,
     },
 };
 
@@ -24,7 +24,7 @@ pub const SAMPLES: [Row; 4] = [
     Row("seed", "Seed", Look::Number("")),
 ];
 
-const AXES: Row = Row("axes", "Axes", Look::Options(&[("z", "z"), ("xyz", "x, y, z")]));
+const AXES: Row = Row("axes", "Axes", Look::List(&[("z", "z"), ("xyz", "x, y, z")]));
 
 const LOADING: Row = Row(
     "loading",
@@ -37,8 +37,9 @@ const LOADING: Row = Row(
     ]),
 );
 
-const NOISE: [Row; 4] = [
-    Row("noise", "Relative noise", Look::Number("%")),
+const NOISE: Row = Row("noise", "Relative noise", Look::Number("%"));
+
+const OTHER_NOISE: [Row; 3] = [
     Row("noise ohm", "Additive noise", Look::Number("Ω")),
     Row("adc bits", "Converter bits", Look::Number("")),
     Row("drift", "Drift", Look::Number("%")),
@@ -47,7 +48,7 @@ const NOISE: [Row; 4] = [
 const NOISY_SETS: Row = Row(
     "noise in",
     "Noise in",
-    Look::Options(&[("both", "Both"), ("training", "Training"), ("test", "Test")]),
+    Look::List(&[("both", "Both"), ("training", "Training"), ("test", "Test")]),
 );
 
 /// Rows, axes, loading, compression and noise of the settings, which are of a simulated array.
@@ -82,11 +83,15 @@ pub fn scene_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
         percent_ui(ui, name, hint, &mut scene.largest_compression, usual, 0.001..=99.0);
     }
     section_heading_ui(ui, "Noise on resistance");
-    fields.show(ui, &NOISE);
-    let simulation = fields.settings.simulation();
-    if simulation.is_some_and(|simulation| !simulation.scene.noise.is_none()) {
-        fields.show(ui, &[NOISY_SETS]);
-    }
+    fields.show(ui, &[NOISE]);
+    let noise = |fields: &Fields<'_>| fields.settings.simulation().map(|simulation| simulation.scene.noise);
+    let others = noise(fields).is_some_and(|noise| !Noise { relative: 0.0, ..noise }.is_none());
+    fold_ui(ui, "Other noise", if others { "set" } else { "none" }, |ui| {
+        fields.show(ui, &OTHER_NOISE);
+        if noise(fields).is_some_and(|noise| !noise.is_none()) {
+            fields.show(ui, &[NOISY_SETS]);
+        }
+    });
 }
 
 /// Shape and sizes of an indenter. A shape that the window does not offer, from a file, is shown and kept.

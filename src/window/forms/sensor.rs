@@ -13,8 +13,8 @@ use crate::window::{
     glossary,
     widgets::{
         dim_ui,
-        fields::{quantity_ui, usually},
-        note_ui, section_heading_ui, segmented_ui, text_ui,
+        fields::{list_ui, quantity_ui, usually},
+        note_ui, text_ui,
     },
 };
 
@@ -43,9 +43,10 @@ pub fn array_ui(ui: &mut Ui, Simulation { sensor, scene, .. }: &mut Simulation) 
     let scale = &mut sensor.scale;
     let hint = glossary::ARRAY_SCALE.hint;
     text_ui(ui, "Array scale", hint, scale, ArrayScale::default());
-    let names = ArrayScale::PRESETS.map(|scale| (scale, format!("{}×{}", scale.rows(), scale.nodes_per_row())));
-    let options: Vec<_> = names.iter().map(|(scale, name)| (*scale, name.as_str())).collect();
-    *scale = segmented_ui(ui, "Array scale of the paper", &options, *scale, true).unwrap_or(*scale);
+    let names = ArrayScale::PRESETS.map(|scale| (scale, scale.to_string()));
+    let listed = Vec::from_iter(names.iter().map(|(scale, name)| (*scale, name.as_str(), "")));
+    let hint = "The arrays of the paper.";
+    *scale = list_ui(ui, "Paper's array", hint, &listed, *scale).unwrap_or(*scale);
     let text = format!(
         "{} of {} over {} of {}",
         counted(scale.rows(), "row-wire"),
@@ -67,7 +68,6 @@ pub fn array_ui(ui: &mut Ui, Simulation { sensor, scene, .. }: &mut Simulation) 
 
 /// Lengths and resistivity.
 pub fn geometry_ui(ui: &mut Ui, sensor: &mut SensorModel) {
-    section_heading_ui(ui, "Geometry");
     for (name, length) in LENGTHS {
         let hint = meaning(name).unwrap_or(PLACES);
         let usual = *length(&mut Geometry::default());

@@ -4,7 +4,7 @@ use decoupler_core::settings::Method;
 use eframe::egui::Ui;
 
 use super::{Fields, Look, Row, SetBy, number_ui};
-use crate::window::widgets::{dim_ui, fields::capitalised, section_heading_ui};
+use crate::window::widgets::{dim_ui, fields::capitalised, fold_ui};
 
 pub(super) const METHOD: Row = Row(
     "method",
@@ -20,14 +20,13 @@ const STOPPING: [Row; 3] = [
     Row("min gradient", "Smallest gradient", Look::Number("")),
 ];
 
-const RESTARTS: [Row; 2] = [
-    Row("starts", "Restarts", Look::Number("")),
-    Row(
-        "combine",
-        "Combine restarts",
-        Look::Below(|| vec![("best", "keep the best"), ("mean", "average their answers")]),
-    ),
-];
+const RESTARTS: Row = Row("starts", "Restarts", Look::Number(""));
+
+const COMBINE: Row = Row(
+    "combine",
+    "Combine restarts",
+    Look::Below(|| vec![("best", "keep the best"), ("mean", "average their answers")]),
+);
 
 /// The method, and what it does.
 pub fn method_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
@@ -37,18 +36,25 @@ pub fn method_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
     }
 }
 
-/// The rules that end the training, the settings of its method, and its restarts. A paused training (`is_new` is false) keeps
-/// the latter.
+/// The largest number of epochs and the restarts; folded, the other rules that end the training and the settings of its method.
+/// A paused training (`is_new` is false) keeps its restarts.
 pub(super) fn training_ui(ui: &mut Ui, fields: &mut Fields<'_>, is_new: bool) {
-    section_heading_ui(ui, "Training");
     fields.show(ui, &[EPOCHS]);
-    if let SetBy::User = fields.set_by {
-        fields.show(ui, &STOPPING);
-        let method = &mut fields.settings.training.method;
-        for setting in method.settings() {
-            let texts = [&capitalised(setting.name), setting.help, ""];
-            number_ui(ui, texts, setting, method, &fields.usual.training.method);
+    ui.add_enabled_ui(is_new, |ui| {
+        fields.show(ui, &[RESTARTS]);
+        if fields.settings.starts > 1 || matches!(fields.set_by, SetBy::Choice(_)) {
+            fields.show(ui, &[COMBINE]);
         }
+    });
+    if let SetBy::User = fields.set_by {
+        let method = fields.settings.training.method.short_name();
+        fold_ui(ui, "Stopping and method", method, |ui| {
+            fields.show(ui, &STOPPING);
+            let method = &mut fields.settings.training.method;
+            for setting in method.settings() {
+                let texts = [&capitalised(setting.name), setting.help, ""];
+                number_ui(ui, texts, setting, method, &fields.usual.training.method);
+            }
+        });
     }
-    ui.add_enabled_ui(is_new, |ui| fields.show(ui, &RESTARTS));
 }

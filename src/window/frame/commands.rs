@@ -177,6 +177,7 @@ fn difference(before: &Drafts, after: &Drafts) -> String {
     names.retain(|setting| setting.get(&a) != setting.get(&b));
     match &names[..] {
         _ if before.0 != after.0 => "source of the samples".to_owned(),
+        [] if after.2.plan == Err(RecordingDraft::NOTHING_OPEN.to_owned()) => "Clear".to_owned(),
         [] if before.2.plan != after.2.plan => "import".to_owned(),
         [] if before.2.is_auto != after.2.is_auto => "automatic settings".to_owned(),
         [] if a.source != b.source => "sensor or scene".to_owned(),

@@ -43,7 +43,9 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     let mut driver = Driver::open();
     shows_panic(&mut driver, "training");
     assert_eq!(driver.state().phase, Phase::Idle);
-    panics(&mut driver, "preview", |driver| driver.click("10×8"));
+    panics(&mut driver, "preview", |driver| {
+        driver.choose("Paper's array", "10×8_4×24");
+    });
     driver.configure_small();
     panics(&mut driver, "demo network", |driver| {
         driver.act("Press the middle of the surface");

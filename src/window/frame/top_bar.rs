@@ -54,8 +54,6 @@ pub(super) fn top_bar_ui(
             tools_ui(ui);
             if is_wide {
                 ui.add_space(space(2));
-                button_ui(ui, Command::Undo, "↺");
-                button_ui(ui, Command::Redo, "↻");
             }
             button_ui(ui, Command::Search, if is_wide { "Search" } else { "…" });
             if width >= SMALL {

@@ -89,6 +89,9 @@ const NAME: f32 = space(18);
 const NUMBERS: f32 = space(12);
 const AXIS: f32 = space(9);
 
+/// Maximum width of a plot with equal scales as a multiple of its height: in a low card it is stretched.
+const MAX_ASPECT: f32 = 1.6;
+
 /// Minimum width of the legend and the notes next to a square plot.
 const NOTES_WIDTH: f32 = space(48);
 
@@ -96,10 +99,6 @@ const NOTES_WIDTH: f32 = space(48);
 /// else above.
 pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnPlot<'a>> {
     let head_ui = |ui: &mut Ui| {
-        // A low card is for the curves; their names are under the pointer.
-        if ui.available_height() < space(30) {
-            return;
-        }
         legend_ui(ui, figure);
         for note in &figure.notes {
             dim_ui(ui, note);
@@ -107,14 +106,18 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
     };
     let is_square = matches!(&figure.plots[..], [plot] if plot.has_equal_scales);
     let left_by_square = ui.available_width() - ui.available_height() - 2.0 * space(3);
-    let are_notes_beside = is_square && left_by_square >= NOTES_WIDTH;
-    if !are_notes_beside {
+    let are_notes_right = is_square && left_by_square >= NOTES_WIDTH;
+    // A low card is for the curves; their names are under the pointer.
+    let low = if is_square { space(64) } else { space(30) };
+    if !are_notes_right && ui.available_height() >= low {
         head_ui(ui);
     }
     let whole = ui.available_rect_before_wrap();
     let count = figure.plots.len().max(1) as f32;
     let mut width = (whole.width() - (count - 1.0) * space(3)) / count;
-    if is_square {
+    if are_notes_right {
+        width = (width - NOTES_WIDTH).min(MAX_ASPECT * whole.height());
+    } else if is_square {
         // Apart from the numbers at the axes.
         width = width.min(whole.height() + space(3));
     }
@@ -144,9 +147,9 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
         if figure.is_stacked {
             let place = slot.with_max_x(slot.left() + names).shrink2(Vec2::new(0.0, space(2)));
             let name = Label::new(RichText::new(&plot.y.name).size(type_size().note)).wrap();
-            let mut beside = ui.new_child(UiBuilder::new().max_rect(place));
-            beside.set_clip_rect(place);
-            beside.add(name);
+            let mut name_ui = ui.new_child(UiBuilder::new().max_rect(place));
+            name_ui.set_clip_rect(place);
+            name_ui.add(name);
             slot.min.x += names;
         }
         let track = figure.is_stacked.then_some(is_last);
@@ -165,7 +168,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
         drawn
     });
     let plots = plots.collect();
-    if are_notes_beside {
+    if are_notes_right {
         let place = whole.with_min_x(slot(1).left()).with_min_y(whole.top() + space(4));
         head_ui(&mut ui.new_child(UiBuilder::new().max_rect(place)));
     }
@@ -212,7 +215,7 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransf
                     .size(type_size().small)
                     .color(palette.dim),
             )
-            .formatter(move |mark, _| described.tick_text(mark.value, mark.step_size))
+            .formatter(move |mark, range| described.tick_text(mark.value, mark.step_size, range))
             // Numbers have full brightness wherever they fit.
             .label_spacing(Rangef::new(apart, apart + 1.0))
             .tick_label_color(palette.dim)
@@ -251,7 +254,8 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransf
         .include_x(*x.end())
         .include_y(*y.start())
         .include_y(*y.end());
-    if plot.has_equal_scales {
+    // In a low card its width is of more use.
+    if plot.has_equal_scales && space.x < 1.2 * space.y {
         shown = shown.data_aspect(1.0);
     }
     let shown = shown.show(ui, |plot_ui| {

@@ -644,7 +644,7 @@ impl NetworkSource {
 /// A file of readings for a network.
 const DECODED: FileWords = FileWords {
     kind: "readings",
-    description: "Decodes all rows of another file with the columns of the readings; a CSV file next to it gets the targets, with \
+    description: "Decodes all samples of another file with the columns of the readings; a CSV file next to it gets the targets, with \
                   the times and groups of the file and the half-widths of the 90 % intervals.",
     extensions: &import::Format::EXTENSIONS,
 };

@@ -9,8 +9,7 @@ use decoupler_files::{
     },
 };
 use eframe::egui::{
-    Align, Button, ComboBox, CursorIcon, Label, Layout, Popup, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, Vec2,
-    vec2,
+    Align, Button, ComboBox, CursorIcon, Label, Layout, Popup, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, vec2,
 };
 
 use super::Effect;
@@ -83,17 +82,21 @@ pub fn view_mode_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
     effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
 }
 
-/// Divides the middle of a view: surfaces above, a chart below at the left, and figures at its right. In a small window it
+/// Divides the middle of a view: surfaces above, a chart below at the left, and figures at its right. In a low window it
 /// scrolls.
 pub fn surfaces_above_ui(ui: &mut Ui, contents_ui: impl FnOnce(&mut Ui, [Rect; 3])) {
-    /// Size below which it scrolls.
-    const MIN_SIZE: Vec2 = vec2(space(160), space(120));
-    let (gap, size) = (space(2), ui.available_size().max(MIN_SIZE));
-    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+    /// Height below which it scrolls.
+    const MIN_HEIGHT: f32 = space(120);
+    let gap = space(2);
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let height = ui.available_height().max(MIN_HEIGHT);
+        // The scroll bar covers nothing.
+        let strip = if height > ui.available_height() { gap } else { 0.0 };
+        let size = vec2(ui.available_width() - strip, height);
         let (whole, _) = ui.allocate_exact_size(size, Sense::hover());
         let lower_height = (0.43 * whole.height()).clamp(space(56), space(100));
         let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
-        let figures_width = (0.42 * whole.width()).clamp(space(80), space(120));
+        let figures_width = (0.42 * whole.width()).clamp(space(64), space(120));
         let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
         let places = [
             upper.with_max_y(upper.max.y - gap),
@@ -115,14 +118,16 @@ pub fn surface_cards_ui(
     mut contents_ui: impl FnMut(&mut Ui, usize, &mut Vec<Effect>),
 ) {
     let gap = space(2);
-    let (whole, scales) = rect.split_left_right_at_x(rect.right() - Surface::SCALE_WIDTH);
+    let (parts, note) = (figure.scales(), figure.note());
+    // Without surfaces the cards take the room of the scale too.
+    let scale_width = if parts.is_empty() { 0.0 } else { Surface::SCALE_WIDTH };
+    let (whole, scales) = rect.split_left_right_at_x(rect.right() - scale_width);
     let width = (whole.width() - gap * (cards as f32 - 1.0)) / cards as f32;
     for place in 0..cards {
         let left = whole.left() + (width + gap) * place as f32;
         let card = Rect::from_x_y_ranges(left..=left + width, whole.y_range());
         card_ui(ui, card, |ui| contents_ui(ui, place, effects));
     }
-    let (parts, note) = (figure.scales(), figure.note());
     let part = scales.height() / parts.len().max(1) as f32;
     for (index, scale) in parts.iter().enumerate() {
         let top = scales.top() + part * index as f32;

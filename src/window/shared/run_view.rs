@@ -16,11 +16,6 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     if shared.can_continue() && ui.add(ghost_button(&longer.name)).on_hover_text(longer.hint).clicked() {
         effects.push(Effect::Continue);
     }
-    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
-    let hint = Command::Train.about().tooltip(ui.ctx());
-    if train.on_hover_text(hint).clicked() {
-        effects.push(Effect::Train);
-    }
     let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, command: Command, effect: Effect| {
         let shown = if is_short {
             text.split(' ').next().unwrap_or(text)
@@ -37,9 +32,19 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         Phase::Paused => ("▶ Resume", Command::ResumeTraining, Effect::Resume),
         _ => ("⏸ Pause", Command::PauseTraining, Effect::Pause),
     };
-    let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-    button_ui(ui, text, can_pause, command, effect);
-    button_ui(ui, "■ Stop", phase.is_busy(), Command::StopTraining, Effect::Stop);
+    // They appear before Train, which stays where it is under the pointer.
+    if phase.is_busy() {
+        let can_pause = matches!(phase, Phase::Training | Phase::Paused);
+        button_ui(ui, text, can_pause, command, effect);
+        button_ui(ui, "■ Stop", true, Command::StopTraining, Effect::Stop);
+    }
+    let obstacle = shared.obstacle();
+    let train = ui.add_enabled(!phase.is_busy() && obstacle.is_none(), primary_button("▶ Train"));
+    let hint = Command::Train.about().tooltip(ui.ctx());
+    let train = train.on_hover_text(&hint);
+    if train.on_disabled_hover_text(obstacle.unwrap_or(&hint)).clicked() {
+        effects.push(Effect::Train);
+    }
 }
 
 /// Returns the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of
@@ -73,8 +78,7 @@ fn phase_in_words(shared: &Shared) -> Status {
         phase => phase,
     };
     let (tone, text) = match phase {
-        Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
-        Phase::Idle => (Tone::Calm, "Ready: press Train"),
+        Phase::Idle => (Tone::Calm, shared.obstacle().unwrap_or("Ready: press Train")),
         Phase::Preparing if is_recording => {
             let preparing = shared.preparing.as_ref().map(|preparing| preparing.text.as_str());
             (Tone::Busy, preparing.unwrap_or("Reading the recording"))

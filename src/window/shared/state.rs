@@ -189,6 +189,13 @@ impl Shared {
         }
     }
 
+    /// Returns the reason why no training can begin, with what to do.
+    pub fn obstacle(&self) -> Option<&str> {
+        let is_recording = self.source == SourceKind::Recording;
+        let reason = self.recording.plan.as_ref().err().filter(|_| is_recording);
+        reason.map(String::as_str)
+    }
+
     /// Setup of the next training.
     ///
     /// # Errors

@@ -56,7 +56,7 @@ impl PastNetworks {
             epoch,
             best_epoch: leader.best_epoch(),
             start: run.leader_number(),
-            elapsed: leader.elapsed(),
+            elapsed: run.training_time(),
             weights,
         }));
         while self.kept.len() > max_count.max(1) {
@@ -168,7 +168,7 @@ mod tests {
                 assert_eq!(past.networks, stopped.network(), "epoch {epoch}");
                 assert_eq!(past.best_epoch, stopped.leader().best_epoch());
                 assert_eq!(past.start, stopped.leader_number());
-                assert!(past.elapsed <= run.trainers()[past.start].elapsed());
+                assert!(past.elapsed <= run.training_time());
             }
         }
     }

@@ -12,7 +12,6 @@ use eframe::egui::{
 
 use super::{
     components::{hinted, refusal_ui, take_refusal},
-    explained_options_ui,
     quantity_text::parse,
 };
 use crate::window::theme::{Theme, space};
@@ -90,24 +89,6 @@ fn to_twelve_digits(value: f64) -> f64 {
     format!("{value:.11e}").parse().unwrap_or(value)
 }
 
-/// Field for one of a few options side by side, each with a tooltip. Returns the one just selected.
-pub fn options_ui<T: Copy + PartialEq>(
-    ui: &mut Ui,
-    name: &str,
-    hint: &str,
-    options: &[(T, &str, &str)],
-    selected: T,
-) -> Option<T> {
-    ui.horizontal(|ui| {
-        ui.set_min_height(space(7));
-        ui.label(name).on_hover_text(hint);
-        let layout = Layout::right_to_left(Align::Center);
-        ui.with_layout(layout, |ui| explained_options_ui(ui, name, options, selected, false))
-            .inner
-    })
-    .inner
-}
-
 /// Field for one option of a drop-down list, each with a tooltip. Returns the one just selected.
 pub fn list_ui<T: Copy + PartialEq>(
     ui: &mut Ui,
@@ -123,7 +104,7 @@ pub fn list_ui<T: Copy + PartialEq>(
     picked
 }
 
-/// Drop-down list of this width without its name; a newly selected option is `picked`.
+/// Drop-down list of this width without its name; a newly selected option is `picked`. It is “Other” while none is selected.
 pub fn combo_ui<T: Copy + PartialEq>(
     ui: &mut Ui,
     name: &str,
@@ -134,7 +115,7 @@ pub fn combo_ui<T: Copy + PartialEq>(
 ) -> Response {
     let shown = options.iter().find(|(option, ..)| *option == selected);
     let combo = ComboBox::from_id_salt(name)
-        .selected_text(shown.map_or("", |(_, text, _)| *text))
+        .selected_text(shown.map_or("Other", |(_, text, _)| *text))
         .width(width)
         .height(space(90));
     let combo = combo.show_ui(ui, |ui| {

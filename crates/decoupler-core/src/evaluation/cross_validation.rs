@@ -178,10 +178,9 @@ impl Effort {
             self.min_epoch_seconds = Some(self.min_epoch_seconds.map_or(seconds, |least| least.min(seconds)));
         }
         self.networks += 1;
-        for trainer in run.trainers() {
-            self.epochs += trainer.latest().epoch;
-            self.seconds += trainer.elapsed().as_secs_f64();
-        }
+        let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
+        self.epochs += epochs.sum::<usize>();
+        self.seconds += run.training_time().as_secs_f64();
         Ok(())
     }
 }

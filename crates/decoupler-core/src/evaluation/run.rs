@@ -86,6 +86,11 @@ impl Run {
         self.wall_time
     }
 
+    /// The training time that is shown and saved: the wall time, or as far as known for a resumed run.
+    pub fn training_time(&self) -> Duration {
+        self.wall_time.unwrap_or_else(|| self.leader().elapsed())
+    }
+
     /// Sets the time of a resumed run, if it was saved.
     pub fn with_wall_time(mut self, saved: Option<Duration>) -> Self {
         self.wall_time = saved.or(self.wall_time);
@@ -404,7 +409,7 @@ pub enum RunError {
     Training(#[from] TrainingError),
     /// The run would take more memory than it may use.
     #[error(
-        "this would take about {:.1} GB of memory, and {memory}: use fewer samples, hidden nodes or starts, or the scaled \
+        "this would take about {:.1} GB of memory, and {memory}: use fewer samples, hidden nodes or restarts, or the scaled \
          conjugate gradient (scg)",
         *.bytes as f64 * 1e-9
     )]

@@ -13,7 +13,7 @@ pub struct TradeOffPoint {
     pub settings: RunSettings,
     /// Decoder, its errors, and its time per frame.
     pub report: DecoderReport,
-    /// Training or fitting time in seconds, summed over all rows and starts.
+    /// Training or fitting time in seconds: [`Run::training_time`] of networks.
     pub training_seconds: f64,
     /// Model-based errors in this scene: [`Baselines::model_based`](super::Baselines::model_based).
     pub model_based: Option<Errors>,
@@ -79,7 +79,7 @@ pub fn measure_trade_off(
             run.finish(job)?;
             set.networks = Some(run.network());
         }
-        let of_run = |run: &Run| run.trainers().iter().map(|start| start.elapsed().as_secs_f64()).sum();
+        let of_run = run.as_ref().map(|run: &Run| run.training_time().as_secs_f64());
         for &kind in offered {
             for &precision in kind.precisions() {
                 job.check()?;
@@ -87,7 +87,7 @@ pub fn measure_trade_off(
                     let point = measured.map(|report| TradeOffPoint {
                         preset: None,
                         settings,
-                        training_seconds: run.as_ref().map_or(report.fit_seconds, of_run),
+                        training_seconds: of_run.unwrap_or(report.fit_seconds),
                         report,
                         model_based,
                     });

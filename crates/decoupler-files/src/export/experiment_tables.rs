@@ -87,11 +87,11 @@ impl ExperimentTable {
 }
 
 const NODES_NOTE: &str = "Median, minimum and maximum over seeds (and repeats). mean: always answering the training mean; \
-     linear: best affine map on resistance; epochs: mean of the starts; training: one network, all its starts.";
+     linear: best affine map on resistance; epochs: mean of the starts; training time: of one training, on one thread.";
 
 const TARGETS_NOTE: &str = "Median, minimum and maximum over seeds. error: mean absolute error in percent of the range of \
      the target, averaged over the targets that vary, and R² likewise; mean: always answering the training mean; ridge: \
-     ridge regression; epochs: mean of the starts; training: one network, all its starts.";
+     ridge regression; epochs: mean of the starts; training time: of one training, on one thread.";
 
 /// A figure of a cell: its name in tables for programs; where readers see it, the heading and kind of its column; its value.
 type CellFigure = (String, Option<(&'static str, ExperimentColumnKind)>, Cell);
@@ -131,7 +131,7 @@ fn figures(of: &experiments::Cell) -> Vec<CellFigure> {
         (format!("mean_{name}"), Some((mean, Other)), of_mean),
         (format!("linear_{name}"), Some((linear, Linear)), of_linear),
         ("epochs_run".to_owned(), Some(("epochs", Other)), of.epochs_run().into()),
-        ("training_seconds".to_owned(), Some(("training", Other)), seconds),
+        ("training_seconds".to_owned(), Some(("training time", Other)), seconds),
         ("epoch_ms".to_owned(), None, of.epoch_ms().into()),
     ]);
     figures

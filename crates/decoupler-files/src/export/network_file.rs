@@ -130,7 +130,7 @@ pub struct PastNetwork {
     pub best_epoch: usize,
     /// Index of the start that was the leader at that epoch.
     pub start: usize,
-    /// Training time of that start up to that epoch, summed over all rows.
+    /// Training time up to that epoch.
     pub elapsed: Duration,
     /// The shared network, or the network of each row-wire.
     pub networks: Networks,

@@ -48,7 +48,7 @@ pub struct RunSummary {
     pub has_nodes: bool,
     /// Error on the test set in percent.
     pub percent: Option<f64>,
-    /// Training time on one thread in seconds.
+    /// Training time in seconds.
     pub seconds: f64,
 }
 

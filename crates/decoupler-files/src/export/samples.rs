@@ -95,7 +95,7 @@ pub struct TrainingRecord {
     pub best_epoch: usize,
     /// Number of epochs run: the last of the history.
     pub epochs: usize,
-    /// Training time on one thread in seconds, summed over the networks of all rows.
+    /// Training time in seconds: [`Run::training_time`].
     pub seconds: f64,
     /// Record of every epoch, from the initial weights on.
     #[serde(with = "decoupler_core::training::epoch_columns")]
@@ -114,7 +114,7 @@ impl TrainingRecord {
             stop_reason: run.stop_reason(),
             best_epoch: trainer.best_epoch(),
             epochs: trainer.history().last().map_or(0, |record| record.epoch),
-            seconds: trainer.elapsed().as_secs_f64(),
+            seconds: run.training_time().as_secs_f64(),
             history: trainer.history().to_vec(),
             stages: trainer.stages().to_vec(),
             starts: run.starts(),

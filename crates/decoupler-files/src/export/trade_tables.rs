@@ -79,7 +79,7 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
         cells.extend(is_array.then(z_mm));
         cells.extend(has_ratio.then(|| cell(TIMES, point.to_model_based())));
         cells.push(cell(FRAME, point.report.frame_us));
-        cells.push(cell(("training_s", "training", "s"), point.training_seconds));
+        cells.push(cell(("training_s", "training time", "s"), point.training_seconds));
         cells
     };
     Table::of_rows(points.into_iter().map(row))
@@ -136,7 +136,7 @@ mod tests {
     use decoupler_core::{
         dataset::{Dataset, Split},
         decoupling::DecoderKind,
-        evaluation::{RunSets, measure_trade_off},
+        evaluation::{Run, RunSets, measure_trade_off},
         scene::RowModel,
     };
     use ndarray::Array2;
@@ -178,7 +178,15 @@ mod tests {
         let mut settings = RunSettings::measured(RowModel::Shared);
         settings.training.stopping.epochs = 3;
         let mut points = Vec::new();
-        let keep = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| points.push(point.unwrap());
+        let keep = |_, point: Result<TradeOffPoint, _>, run: Option<&Run>| {
+            let point = point.unwrap();
+            let time = run.map(|run| run.wall_time().unwrap().as_secs_f64());
+            assert!(
+                time.is_none_or(|time| time == point.training_seconds),
+                "that of the training"
+            );
+            points.push(point);
+        };
         let kinds = [DecoderKind::Ridge, DecoderKind::Network];
         measure_trade_off(
             &settings,

@@ -107,7 +107,7 @@ impl PlotAxis {
     /// Returns a value as text: `12`, `0.0123`, the name of a named value.
     pub fn value_text(&self, value: f64) -> String {
         match &self.scale {
-            Scale::Names(_) => self.tick_text(value, 1.0),
+            Scale::Names(_) => self.tick_text(value, 1.0, &(0.0..=0.0)),
             _ if value.fract() == 0.0 && value.abs() < 1e9 => format!("{value:.0}").replace('-', "−"),
             _ => format_number(value).replace('-', "−"),
         }
@@ -155,15 +155,15 @@ impl PlotAxis {
     /// least the share `apart` of the range.
     pub(crate) fn numbers(&self, range: &RangeInclusive<f64>, apart: f32) -> Vec<(f64, String)> {
         let ticks = self.ticks(range, f64::from(apart) * (range.end() - range.start()));
-        let number = |&place: &f64| (share(place, range), self.tick_text(place, ticks.step));
+        let number = |&place: &f64| (share(place, range), self.tick_text(place, ticks.step, range));
         ticks.places.iter().map(number).collect()
     }
 
-    /// Returns the text at a tick, given the distance to the next.
-    pub fn tick_text(&self, place: f64, step: f64) -> String {
+    /// Returns the text at a tick, given the distance to the next and the range of places, which have numbers of one kind.
+    pub fn tick_text(&self, place: f64, step: f64, range: &RangeInclusive<f64>) -> String {
         match &self.scale {
             Scale::Names(names) => names.get(place.round() as usize).cloned().unwrap_or_default(),
-            Scale::Logarithmic => power_text(place),
+            Scale::Logarithmic => power_text(place, range),
             _ => tick_text(place, step),
         }
     }
@@ -213,20 +213,19 @@ fn logarithmic_ticks(range: &RangeInclusive<f64>, apart: f64, least: f64) -> Tic
     }
 }
 
-/// Returns the number at a tick of a logarithmic axis, given its decimal logarithm: `0.02`, `5e−4`, `1e80`.
-fn power_text(log: f64) -> String {
+/// Returns the number at a tick of a logarithmic axis, given its decimal logarithm: `0.02`, or `2e−2` on an axis that spans
+/// very small or large numbers.
+fn power_text(log: f64, range: &RangeInclusive<f64>) -> String {
     // Three digits distinguish any two ticks. The exponent is split off before 10 to its power overflows.
     let decade = (log + 1e-9).floor();
-    let short = |text: String| match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
-    };
-    if (-3.0..5.0).contains(&decade) {
-        short(format!("{:.*}", (2.0 - decade).max(0.0) as usize, 10.0_f64.powf(log)))
-    } else {
-        let digits = short(format!("{:.2}", 10.0_f64.powf(log - decade)));
-        format!("{digits}e{decade}").replace('-', "−")
-    }
+    let is_plain = *range.start() > -4.5 && *range.end() < 5.5;
+    let exponent = if is_plain { 0.0 } else { decade };
+    let decimals = (2.0 + exponent - decade).max(0.0) as usize;
+    let number = format!("{:.decimals$}", 10.0_f64.powf(log - exponent));
+    let digits = number.trim_end_matches('0').trim_end_matches('.');
+    let short = if number.contains('.') { digits } else { &number };
+    let power = if is_plain { String::new() } else { format!("e{decade}") };
+    format!("{short}{power}").replace('-', "−")
 }
 
 /// Returns 1, 2 or 5 times a power of ten, at least `smallest`.
@@ -253,12 +252,16 @@ pub(super) fn step_for(range: &RangeInclusive<f64>, parts: usize) -> f64 {
     }
 }
 
-/// Returns the number at a tick, with as many decimals as its step needs and a true minus sign.
+/// Returns the number at a tick, with as many digits as its step needs and a true minus sign: `0`, `0.25`, `2.5e−9`.
 pub fn tick_text(value: f64, step: f64) -> String {
-    let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
-    let rounds_to_zero = value.abs() < 0.5 * 10_f64.powi(-(decimals as i32));
-    let value = if rounds_to_zero { 0.0 } else { value };
-    format!("{value:.decimals$}").replace('-', "−")
+    let decade = (step.log10() + 1e-9).floor();
+    let digits = |decades: f64| decades.clamp(0.0, 9.0) as usize;
+    let text = match (-6.0..6.0).contains(&decade) {
+        _ if value.abs() < 0.5 * 10_f64.powf(decade) => "0".to_owned(),
+        true => format!("{value:.*}", digits(-decade)),
+        false => format!("{value:.*e}", digits(value.abs().log10().floor() - decade)),
+    };
+    text.replace('-', "−")
 }
 
 #[cfg(test)]
@@ -269,14 +272,16 @@ mod tests {
     fn texts(axis: &PlotAxis, [low, high]: [f64; 2], points: f64, number: f64) -> Vec<String> {
         let ticks = axis.ticks(&(low..=high), (high - low) * number / points);
         let places = ticks.places.iter();
-        places.map(|&place| axis.tick_text(place, ticks.step)).collect()
+        places
+            .map(|&place| axis.tick_text(place, ticks.step, &(low..=high)))
+            .collect()
     }
 
     #[test]
     fn ticks_of_a_plain_axis_are_round_and_few() {
         let axis = PlotAxis::linear("");
         let texts = |low, high, points| texts(&axis, [low, high], points, 50.0);
-        assert_eq!(texts(-0.3, 1.1, 300.0), ["0.0", "0.5", "1.0"]);
+        assert_eq!(texts(-0.3, 1.1, 300.0), ["0", "0.5", "1.0"]);
         assert_eq!(texts(3.98, 5.02, 300.0), ["4.0", "4.2", "4.4", "4.6", "4.8", "5.0"]);
         assert_eq!(texts(0.0, 1000.0, 300.0), ["0", "200", "400", "600", "800", "1000"]);
         assert_eq!(texts(0.0, 1000.0, 120.0), ["0", "500", "1000"], "a narrow chart");
@@ -288,7 +293,8 @@ mod tests {
     fn ticks_of_a_logarithmic_axis_are_in_view_and_read_as_numbers() {
         let axis = PlotAxis::logarithmic("");
         let texts = |low, high, points| texts(&axis, [low, high], points, 16.0);
-        assert_eq!(texts(-4.2, 0.1, 150.0), ["1e−4", "0.001", "0.01", "0.1", "1"]);
+        assert_eq!(texts(-4.2, 0.1, 150.0), ["0.0001", "0.001", "0.01", "0.1", "1"]);
+        assert_eq!(texts(-5.2, 0.1, 150.0), ["1e−5", "1e−4", "1e−3", "1e−2", "1e−1", "1e0"]);
         assert_eq!(texts(-1.1, 0.2, 150.0), ["0.1", "0.2", "0.5", "1"]);
         assert_eq!(texts(-1.1, 0.2, 60.0), ["0.1", "1"]);
         assert_eq!(texts(-0.73, -0.69, 150.0), ["0.19", "0.195", "0.2"]);
@@ -365,7 +371,10 @@ mod tests {
         for (value, step, text) in [
             (4.0, 0.2, "4.0"),
             (-0.25, 0.05, "−0.25"),
-            (-1e-17, 0.1, "0.0"),
+            (-1e-17, 0.1, "0"),
+            (2e-12, 2e-12, "2e−12"),
+            (-1.2e-9, 2e-10, "−1.2e−9"),
+            (3e7, 1e7, "3e7"),
             (10.0, 5.0, "10"),
             (0.1, 0.1, "0.1"),
         ] {

@@ -1,7 +1,8 @@
 //! Distribution of the errors of nodes or of a target of a recording, and decoded against actual values with the fitted
 //! line.
 
-use decoupler_core::{dataset::Dataset, evaluation::NodeAddress, problem::Channel, text::format_number};
+use decoupler_core::text::{format_number, format_r2};
+use decoupler_core::{dataset::Dataset, evaluation::NodeAddress, problem::Channel};
 use glam::DVec2;
 use ndarray::Array2;
 
@@ -25,7 +26,7 @@ impl Decoded<'_> {
     /// Returns the name of a value, its unit, the name of the network's answer, and that of many samples.
     fn words(&self) -> (&str, Option<&str>, [&'static str; 2]) {
         match self {
-            Self::Nodes => ("z", Some("mm"), ["decoupled", "nodes"]),
+            Self::Nodes => ("z", Some("mm"), ["decoded", "nodes"]),
             Self::Target(target) => (&target.name, target.unit.as_deref(), ["decoded", "samples"]),
         }
     }
@@ -146,7 +147,7 @@ pub fn regression_figure(
         let sign = if fit.offset < 0.0 { '−' } else { '+' };
         let [slope, offset] = [fit.slope, fit.offset.abs()].map(format_number);
         let offset = with_unit(offset, unit);
-        notes.push(format!("Correlation R = {}", format_number(fit.correlation)));
+        notes.push(format!("Correlation R = {}", format_r2(fit.correlation)));
         notes.push(format!("Fitted line: {answer} = {slope} · actual {sign} {offset}"));
     }
     decoded_against_actual(&titled(name, unit), answer, series, notes)

@@ -45,7 +45,7 @@ pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_bel
     });
     let unknowns = rows.get(worst).map_or(1, Identifiability::unknowns);
     let x = PlotAxis::integers("deformation pattern, best seen first").including([0.5, unknowns as f64 + 0.5]);
-    let y = PlotAxis::logarithmic("singular value of ∂ ln R/∂u (1/mm)");
+    let y = PlotAxis::logarithmic("singular value (1/mm)");
     Plot::new(x, y, others.chain(strongest).chain(noise)).into()
 }
 
@@ -72,7 +72,7 @@ pub fn node_figure(
     };
     let decoupled_mm = decoupled_mm.unwrap_or_default();
     let actual = series("actual", ACTUAL, actual_mm, &[]);
-    let decoupled = series("decoupled", DECODED, decoupled_mm, spread_mm.unwrap_or_default());
+    let decoupled = series("decoded", DECODED, decoupled_mm, spread_mm.unwrap_or_default());
     // A tick at the last node of a row.
     let x = PlotAxis::new("node, row by row", Scale::Multiples(nodes_per_row as f64));
     Plot::new(x, PlotAxis::linear("z (mm)"), [actual, decoupled]).into()
@@ -226,12 +226,12 @@ mod tests {
         let decoupled = &figure.plots[0].series[1];
         assert_eq!(
             decoupled.points[2].note.as_deref(),
-            Some("Row 2, node 1\ndecoupled z: 5.00 mm ± 0.300 mm")
+            Some("Row 2, node 1\ndecoded z: 5.00 mm ± 0.300 mm")
         );
         assert_eq!(
             node_figure(&actual, None, None, 1).keys().len(),
             1,
-            "nothing decoupled yet"
+            "nothing decoded yet"
         );
     }
 }

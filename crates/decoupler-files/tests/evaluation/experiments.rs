@@ -481,7 +481,7 @@ fn tables_of_a_recording_have_its_error_measures_and_target_names() {
             "mean %",
             "ridge %",
             "epochs",
-            "training"
+            "training time"
         ],
         "nothing is published for a recording"
     );

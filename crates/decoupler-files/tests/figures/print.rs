@@ -119,7 +119,7 @@ fn node_plots_have_a_square_and_a_disc_for_each_node_and_optional_bars() {
     let draw = |spread_mm| Figure::from(node_figure(&actual, Some(&decoupled), spread_mm, 3)).draw();
     let plain = draw(None);
     assert_eq!(discs(&plain).len(), 3 + 1);
-    for name in ["actual", "decoupled", "node, row by row", "z (mm)"] {
+    for name in ["actual", "decoded", "node, row by row", "z (mm)"] {
         assert!(texts(&plain).iter().any(|text| text == name), "{name}");
     }
     // Below the bars the axis reaches further down, so its ticks may be others.

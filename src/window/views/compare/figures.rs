@@ -78,7 +78,7 @@ fn figures(file: &NetworkFile) -> Vec<(String, Cell)> {
     named_settings(&file.settings).for_each(|(name, value, _)| add(name, value.into()));
     let best_epoch = format!("{} of {}", training.best_epoch, training.epochs);
     add("best epoch", best_epoch.into());
-    add("training time, one thread", Cell::Seconds(Some(training.seconds)));
+    add("training time", Cell::Seconds(Some(training.seconds)));
     figures
 }
 

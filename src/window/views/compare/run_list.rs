@@ -36,7 +36,7 @@ pub(super) fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u6
                 let time = Duration::try_from_secs_f64(run.summary.seconds).unwrap_or_default();
                 let what = if run.summary.has_nodes { "Z" } else { "Error" };
                 let percent = format_percent(run.summary.percent);
-                let text = format!("{what} {percent}, {} on one thread", format_duration(time));
+                let text = format!("{what} {percent}, training time {}", format_duration(time));
                 ui.label(RichText::new(text).size(type_size().note));
                 ui.horizontal(|ui| match *removing == Some(run.id) {
                     true => confirm_ui(ui, run, removing, effects),

@@ -144,6 +144,11 @@ impl LiveView {
         network.is_none_or(|(_, file)| file.problem.sensor.is_some())
     }
 
+    /// Returns the name of what is decoded at a time.
+    pub(super) fn unit(&self, shared: &Shared) -> &'static str {
+        if self.has_sensor(shared) { "frame" } else { "sample" }
+    }
+
     /// Returns true while frames are recorded.
     pub(super) fn is_recording(&self) -> bool {
         self.running.is_some() && self.shown.is_recording
@@ -282,7 +287,7 @@ impl LiveView {
     /// Returns the state of the stream, its network and source, and its rate.
     fn status(&self, shared: &Shared) -> Status {
         let (counts, replay) = (&self.shown.counts, &self.shown.replay);
-        let unit = if self.has_sensor(shared) { "frame" } else { "sample" };
+        let unit = self.unit(shared);
         let Some(running) = &self.running else {
             let text = match (self.plan(shared), counts.decoded) {
                 (Err(obstacle), _) => obstacle,

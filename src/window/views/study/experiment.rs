@@ -192,7 +192,7 @@ impl ExperimentForm {
         count_ui(ui, "Folds", hint, &mut validation.folds, 2..=MAX_TRIALS);
         let hint = "Number of shuffles into new folds, for each seed.";
         count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MAX_TRIALS);
-        let of_samples = "As in the paper: rows of one snapshot may be in both the training and the test folds.";
+        let of_samples = "As in the paper: samples of one snapshot may be in both the training and the test folds.";
         let of_snapshots = "Whole snapshots: no training sample is from the same moment as a test sample.";
         let units = [
             (SplitBy::Random, "By sample", of_samples),

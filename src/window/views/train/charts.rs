@@ -19,7 +19,7 @@ use crate::window::{
     shared::{Command, Effect, Offers, RunResult, RunView, Shared, SourceKind, target_choice_ui},
     test_view::TestView,
     theme::{Theme, space},
-    widgets::{card_ui, dim_ui, placeholder_ui, tabs_ui},
+    widgets::{card_ui, dim_ui, fields::combo_ui, placeholder_ui, tabs_ui},
 };
 
 /// A chart of the displayed result.
@@ -29,6 +29,8 @@ pub(super) struct Chart {
     pub name: &'static str,
     /// What appears in it once a network is trained.
     hint: &'static str,
+    /// True if it is one of the list beside the tabs.
+    is_rare: bool,
     /// Returns false while it has nothing to do with what is displayed.
     is_offered: fn(&Shared) -> bool,
     /// Returns its figure, once there is something to draw.
@@ -54,6 +56,7 @@ enum Items {
 const BARE: Chart = Chart {
     name: "",
     hint: "",
+    is_rare: false,
     is_offered: |_| true,
     draw: |_, _| None,
     items: Items::None,
@@ -80,6 +83,7 @@ const LOSS: Chart = Chart {
 const TRAINING_STATE: Chart = Chart {
     name: "Training state",
     hint: "The gradient and the method's own quantities appear here while the network trains.",
+    is_rare: true,
     draw: |view, shared| {
         let (run, _) = trained(view, shared)?;
         Some(training_state_figure(run.outline.records(), &run.stages).into())
@@ -90,6 +94,7 @@ const TRAINING_STATE: Chart = Chart {
 const HISTOGRAM: Chart = Chart {
     name: "Histogram",
     hint: "The distribution of the z errors in the test set appears here.",
+    is_rare: true,
     draw: |view, shared| {
         let (pairs, of) = pairs(view, shared)?;
         Some(histogram_figure(&pairs, of).into())
@@ -163,6 +168,7 @@ const ERROR_MAP: Chart = Chart {
 /// The paper's Fig. 6.
 pub(super) const NODES: Chart = Chart {
     name: "Nodes",
+    is_rare: true,
     draw: |view, shared| {
         let nodes_per_row = shared.skin()?.sensor.scale.nodes_per_row();
         let drawing = view.drawing()?;
@@ -425,17 +431,19 @@ fn target_bar_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, id: &str) {
 /// The charts below the surfaces, including the readings unless they have their own card, and the bar that goes through
 /// past epochs.
 pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_readings: bool) {
-    /// Width of a card below which the longest name of a tab is cut.
-    const NARROW: f32 = space(106);
-    let is_narrow = ui.available_width() < NARROW;
     let offered = Vec::from_iter(charts(shared, has_readings));
     let chart = offered.iter().find(|chart| chart.name == view.tab);
     let chart = *chart.unwrap_or(&&LOSS);
-    let tabs = offered.iter().map(|chart| match chart.name {
-        "Training state" if is_narrow => (chart.name, "State"),
-        name => (name, name),
+    let (rare, usual): (Vec<&Chart>, Vec<&Chart>) = offered.iter().copied().partition(|chart| chart.is_rare);
+    let tabs = Vec::from_iter(usual.iter().map(|chart| (chart.name, chart.name)));
+    let listed = Vec::from_iter(rare.iter().map(|chart| (chart.name, chart.name, "")));
+    ui.horizontal(|ui| {
+        let mut picked = tabs_ui(ui, "Charts", &tabs, chart.name);
+        let list = combo_ui(ui, "More charts", space(27), &listed, chart.name, &mut picked);
+        ui.ctx()
+            .accesskit_node_builder(list.id, |node| node.set_label("More charts"));
+        view.tab = picked.unwrap_or(chart.name);
     });
-    view.tab = tabs_ui(ui, "Charts", &Vec::from_iter(tabs), chart.name).unwrap_or(chart.name);
     let past = shared.shown_run().map(|run| &run.past);
     let past = past.filter(|past| past.epochs().len() > 1);
     let mut place = ui.available_rect_before_wrap();

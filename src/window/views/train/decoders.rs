@@ -320,7 +320,7 @@ const WORST_MM: Figure = Figure {
 
 const FRAME_TIME: Figure = Figure {
     heading: "µs",
-    meaning: || "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
+    meaning: || "Time to decode a frame (all row-wires, or one sample of a recording) on one thread, in µs: the median of many.",
     value: |report, _, _| Some(report.frame_us),
 };
 

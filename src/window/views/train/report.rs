@@ -18,7 +18,7 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Button, Frame, Layout, Margin, Response, RichText, Stroke, Ui, WidgetInfo, accesskit::Role};
 
-use super::{decoders::decoders_ui, press::press_section_ui, view::TrainView};
+use super::{decoders::decoders_ui, press::press_section_ui, recording::Fix, view::TrainView};
 use crate::window::{
     glossary,
     shared::{
@@ -68,6 +68,13 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         });
         if view.scrub.epoch().is_some() {
             dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
+        }
+        if let (Combination::Mean, 2..) = (run.settings().combine, run.starts.len()) {
+            let text = format!(
+                "The network is the average of {}; Details lists each of them.",
+                run.starts.len()
+            );
+            dim_ui(ui, &text);
         }
         if let (Some(errors), Some(skin)) = (result.errors.nodes(), &run.test.skin) {
             worst_node_ui(ui, view, errors, skin);
@@ -275,8 +282,14 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
     );
 }
 
-/// A remark on a result, and the button that mends its cause.
-type Remark = (String, Option<(String, Vec<Effect>)>);
+/// A remark on a result, and what is offered to fix its cause.
+type Remark<'a> = (String, Option<Offered<'a>>);
+
+/// A button of a remark.
+enum Offered<'a> {
+    Fix(&'a Fix),
+    UseRidge,
+}
 
 /// Reports the most urgent remark with what mends it, or by how much the network is better; returns the other remarks.
 fn verdict_ui(
@@ -286,9 +299,9 @@ fn verdict_ui(
     (run, result, reason): (&RunView, &RunResult, StopReason),
     effects: &mut Vec<Effect>,
 ) -> Vec<String> {
-    let cures = view.recording.cures(shared).into_iter();
-    let cures = cures.map(|(text, button, effects)| (text, Some((button, effects))));
-    let mut remarks = Vec::<Remark>::from_iter(cures);
+    let fixes = view.recording.fixes.iter();
+    let fixes = fixes.map(|fix| (fix.problem.clone(), Some(Offered::Fix(fix))));
+    let mut remarks = Vec::<Remark<'_>>::from_iter(fixes);
     remarks.extend(result.defect.as_ref().map(|defect| (capitalised(defect), None)));
     let praise = match (result.errors.nodes(), run.baselines.linear.nodes()) {
         (Some(errors), Some(linear)) => of_nodes(run, (result, errors, linear), reason, &mut remarks),
@@ -296,11 +309,13 @@ fn verdict_ui(
     };
     let mut remarks = remarks.into_iter();
     match (remarks.next(), praise) {
-        (Some((text, cure)), _) => {
+        (Some((text, offered)), _) => {
             note_ui(ui, &sentence(&text));
-            let (name, cure) = cure.unzip();
-            if name.is_some_and(|name| ui.add(primary_button(&name)).clicked()) {
-                effects.extend(cure.unwrap_or_default());
+            let mut is_clicked = |name: &str| ui.add(primary_button(name)).clicked();
+            match offered {
+                Some(Offered::Fix(fix)) if is_clicked(&fix.button) => effects.extend(fix.effects(shared)),
+                Some(Offered::UseRidge) if is_clicked("Use ridge") => effects.push(Effect::UseRidge),
+                _ => {}
             }
         }
         (None, Some(praise)) => good_ui(ui, &praise),
@@ -314,7 +329,7 @@ fn of_nodes(
     run: &RunView,
     (result, errors, linear): (&RunResult, &Errors, &Errors),
     reason: StopReason,
-    remarks: &mut Vec<Remark>,
+    remarks: &mut Vec<Remark<'_>>,
 ) -> Option<String> {
     let (settings, baselines) = (run.settings(), &run.baselines);
     let of_network = error_remarks(settings, &run.scores(result), Some(reason));
@@ -342,7 +357,7 @@ fn of_nodes(
 }
 
 /// Adds the remarks on the errors of targets; returns by how much the network is better than ridge regression.
-fn of_targets(run: &RunView, result: &RunResult, remarks: &mut Vec<Remark>) -> Option<String> {
+fn of_targets(run: &RunView, result: &RunResult, remarks: &mut Vec<Remark<'_>>) -> Option<String> {
     let pairs = result.errors.targets().iter().zip(run.baselines.linear.targets());
     let ratios = pairs.map(|(network, ridge)| ridge.rmse / network.rmse);
     let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
@@ -351,12 +366,11 @@ fn of_targets(run: &RunView, result: &RunResult, remarks: &mut Vec<Remark>) -> O
         run.kept.is_none() && run.stop_reason != Some(StopReason::Stopped) && result.networks.only().is_some();
     let worse = describe_worse_than_ridge(&run.problem, &run.scores(result));
     for remark in &result.remarks {
-        let cure =
-            (may_use_ridge && worse.as_ref() == Some(remark)).then(|| ("Use ridge".to_owned(), vec![Effect::UseRidge]));
-        remarks.push((remark.clone(), cure));
+        let offered = (may_use_ridge && worse.as_ref() == Some(remark)).then_some(Offered::UseRidge);
+        remarks.push((remark.clone(), offered));
     }
     // What has a button comes first.
-    remarks.sort_by_key(|(_, cure)| cure.is_none());
+    remarks.sort_by_key(|(_, offered)| offered.is_none());
     let (low, high) = extreme(f64::min).zip(extreme(f64::max))?;
     let times = if low == high { low } else { format!("{low} to {high}") };
     let holds = match result.coverage.iter().any(Option::is_some) {
@@ -383,12 +397,8 @@ fn good_ui(ui: &mut Ui, text: &str) {
 
 fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let epochs = result.epochs_run;
-    let training = match run.settings().starts {
-        ..=1 => "Training",
-        _ => "Training, all restarts",
-    };
     let text = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
-    let mut rows = vec![(training, text(result.wall_time))];
+    let mut rows = vec![("Training time", text(result.wall_time))];
     if epochs > 0 {
         let an_epoch = result.wall_time.map(|time| time.div_f64(epochs as f64));
         rows.push(("Time per epoch", text(an_epoch)));
@@ -452,9 +462,9 @@ fn spread_ui(ui: &mut Ui, run: &RunView) {
     let table = Table {
         columns: vec![
             TableColumn::new("error", "", ""),
-            TableColumn::field("min").meaning("Best start."),
-            TableColumn::field("median").meaning("Median of all starts: the typical result of a single start."),
-            TableColumn::field("max").meaning("Worst start."),
+            TableColumn::field("min").meaning("Best restart."),
+            TableColumn::field("median").meaning("Median of all restarts: the typical result of a single one."),
+            TableColumn::field("max").meaning("Worst restart."),
         ],
         rows: spreads.into_iter().filter_map(row).collect(),
     };
@@ -463,7 +473,7 @@ fn spread_ui(ui: &mut Ui, run: &RunView) {
     dim_ui(
         ui,
         &match run.settings().combine {
-            Combination::Best => format!("Start {best} is kept: it has the lowest {error}."),
+            Combination::Best => format!("Restart {best} is kept: it has the lowest {error}."),
             Combination::Mean => format!(
                 "Their average is used, which is often better than each; network {best} has the lowest {error}."
             ),

@@ -193,7 +193,7 @@ pub fn scrub_bar_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks) {
             // As wide as the widest, so that the slider keeps its length.
             let palette = Theme::of(ui).palette;
             let (text, colour) = match scrub.epoch() {
-                Some(epoch) => (format!("Network of epoch {epoch}"), palette.warning),
+                Some(epoch) => (format!("Network of epoch {epoch}"), palette.violet),
                 None => (format!("Latest, epoch {latest}"), palette.dim),
             };
             let size = Vec2::new(space(38), space(6));

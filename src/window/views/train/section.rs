@@ -4,14 +4,14 @@ use decoupler_files::figure::{
     PlotFigure,
     surface::{Section, SectionLine, section_figure},
 };
-use eframe::egui::{Button, Color32, TextStyle, Ui, Vec2, WidgetInfo, accesskit::Role};
+use eframe::egui::{DragValue, Ui};
 use glam::DVec2;
 
 use crate::window::{
     shared::Look,
     test_view::{Drawing, Skin},
     theme::space,
-    widgets::{dim_ui, explained_options_ui},
+    widgets::explained_options_ui,
 };
 
 /// Direction of a section.
@@ -122,29 +122,19 @@ pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, skin: &Skin) {
         let picked = explained_options_ui(ui, "Section along", &DIRECTIONS, choice.along, false);
         choice.along = picked.unwrap_or(choice.along);
         ui.add_space(space(1));
-        step_ui(ui, choice, -1, skin);
-        let axis = choice.along as usize;
-        ui.label(format!("{} of {}", choice.wires(skin)[axis] + 1, counts(skin)[axis]));
-        step_ui(ui, choice, 1, skin);
-        let hint = "or click a surface or a reading";
-        let font = TextStyle::Body.resolve(ui.style());
-        let galley = ui.painter().layout_no_wrap(hint.to_owned(), font, Color32::WHITE);
-        if galley.size().x < ui.available_width() {
-            dim_ui(ui, hint);
+        let (axis, mut wires) = (choice.along as usize, choice.wires(skin));
+        let (count, mut number) = (counts(skin)[axis], wires[axis] + 1);
+        let field = DragValue::new(&mut number)
+            .range(1..=count)
+            .suffix(format!(" of {count}"));
+        let field = ui.add(field);
+        ui.ctx()
+            .accesskit_node_builder(field.id, |node| node.set_label("Wire of the section"));
+        let hint = "Type a number, drag, press [ or ], or click a surface or a reading.";
+        field.on_hover_text(hint);
+        if number != wires[axis] + 1 {
+            wires[axis] = number - 1;
+            choice.choose(wires);
         }
     });
-}
-
-/// An arrow to the wire before (`by` −1) or after (+1).
-fn step_ui(ui: &mut Ui, choice: &mut SectionChoice, by: isize, skin: &Skin) {
-    let (text, name, hint) = match by {
-        ..0 => ("‹", "Previous section", "Cuts along the previous wire ([)."),
-        _ => ("›", "Next section", "Cuts along the next wire (])."),
-    };
-    let stepped = choice.stepped(by, skin);
-    let arrow = ui.add_enabled(stepped.is_some(), Button::new(text).min_size(Vec2::splat(space(6))));
-    arrow.widget_info(|| WidgetInfo::labeled(Role::Button, stepped.is_some(), name));
-    if arrow.on_hover_text(hint).clicked() {
-        *choice = stepped.unwrap_or(*choice);
-    }
 }

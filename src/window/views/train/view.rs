@@ -25,7 +25,7 @@ use crate::window::{
     },
     test_view::{Drawing, TestView},
     theme::space,
-    widgets::{card_ui, snapshot_ui},
+    widgets::{card_ui, dim_ui, snapshot_ui},
 };
 
 impl View for TrainView {
@@ -64,7 +64,11 @@ impl View for TrainView {
         };
         let can_pause = matches!(phase, Phase::Training | Phase::Paused);
         for (command, is_possible, effect) in [
-            (Command::Train, !phase.is_busy(), Effect::Train),
+            (
+                Command::Train,
+                !phase.is_busy() && shared.obstacle().is_none(),
+                Effect::Train,
+            ),
             (Command::TrainLonger, shared.can_continue(), Effect::Continue),
             (pause, can_pause, paused),
             (Command::StopTraining, phase.is_busy(), Effect::Stop),
@@ -104,8 +108,11 @@ impl View for TrainView {
             SourceKind::Recording => "sample",
         };
         let snapshots = shared.test().map_or(0, TestView::snapshots);
-        // In a very narrow window the keys remain.
-        if ui.ctx().content_rect().width() >= 800.0 {
+        let width = ui.ctx().content_rect().width();
+        // In a narrow window the status line and the keys remain.
+        if let Some(obstacle) = shared.obstacle().filter(|_| width >= 1200.0 && snapshots == 0) {
+            dim_ui(ui, obstacle);
+        } else if width >= 800.0 {
             if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, snapshots) {
                 self.show_snapshot(snapshot);
             }
@@ -247,12 +254,12 @@ impl TrainView {
                 .min(0.6 * lower.width()),
             false => (0.4 * lower.width()).floor(),
         };
-        let (mut charts, beside) = lower.split_left_right_at_x(lower.right() - width);
+        let (mut charts, right) = lower.split_left_right_at_x(lower.right() - width);
         charts.max.x -= gap;
         if is_narrow {
-            card_ui(ui, beside, |ui| report::report_ui(ui, self, shared, effects));
+            card_ui(ui, right, |ui| report::report_ui(ui, self, shared, effects));
         } else if has_sensor {
-            card_ui(ui, beside, |ui| {
+            card_ui(ui, right, |ui| {
                 readings_head_ui(ui, self.drops_percent());
                 readings_of_view_ui(ui, self, shared);
             });

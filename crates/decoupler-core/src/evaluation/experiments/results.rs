@@ -156,7 +156,7 @@ impl Cell {
         self.median(|trial| Some(trial.effort.epochs as f64 / (trial.effort.networks * starts).max(1) as f64))
     }
 
-    /// Training time of a network in seconds, over all its starts.
+    /// Time of a training in seconds, with all its starts.
     pub fn training_seconds(&self) -> Option<f64> {
         self.median(|trial| Some(trial.effort.seconds / trial.effort.networks.max(1) as f64))
     }

@@ -220,7 +220,7 @@ impl RunReport<'_> {
             ),
         };
         format!(
-            "{error}. Trained for {}, {} on one thread ({reason}); weights kept from epoch {}.",
+            "{error}. Trained for {} in {} ({reason}); weights kept from epoch {}.",
             counted(training.epochs, "epoch"),
             format_duration(time),
             training.best_epoch

@@ -89,7 +89,7 @@ pub fn section_figure(section: &Section, rows: &[usize], actual: &Surface, decou
         SectionLine::ColumnWire(column) => (format!("column-wire {}", column + 1), "x", |place| place.x),
     };
     let shown = || {
-        let decoupled = decoupled.map(|surface| ("decoupled", Ink::Blue, Marker::Disc, surface));
+        let decoupled = decoupled.map(|surface| ("decoded", Ink::Blue, Marker::Disc, surface));
         std::iter::once(("actual", Ink::Grey, Marker::Square, actual)).chain(decoupled)
     };
     let title = capitalised(&name);
@@ -239,9 +239,9 @@ mod figure_tests {
             names,
             [
                 "actual",
-                "decoupled",
+                "decoded",
                 "actual nodes",
-                "decoupled nodes",
+                "decoded nodes",
                 "beyond the nodes",
                 "beyond the nodes"
             ]
@@ -255,7 +255,7 @@ mod figure_tests {
         }
         let node = &plot.series[3].points[2];
         assert_eq!(node.item, Some(6), "the third node of the second row read");
-        assert_eq!(node.note.as_deref(), Some("Row-wire 5, node 3\ndecoupled z: 4.43 mm"));
+        assert_eq!(node.note.as_deref(), Some("Row-wire 5, node 3\ndecoded z: 4.43 mm"));
         let beyond: Vec<_> = plot.lines_across().map(|(_, at)| at).collect();
         assert_eq!(beyond, [[2.0, 3.0], [9.0, 10.0]].map(LineAt::Between));
     }

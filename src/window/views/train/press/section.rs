@@ -27,12 +27,14 @@ use crate::window::{
     },
 };
 
-/// The finger, and the answers of all decoders to it.
+/// The finger while it presses, and the answers of all decoders to it.
 pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     let Some(skin) = shared.skin() else { return };
     section_heading_ui(ui, "Press");
-    finger_ui(ui, press, skin.stroke_mm);
-    ui.add_space(space(1));
+    if press.is_pressing() {
+        finger_ui(ui, press, skin.stroke_mm);
+        ui.add_space(space(1));
+    }
     match &press.answered {
         Some((question, Ok(shown))) => {
             let is_compared = question.subject.is_some() && question.is_idle;

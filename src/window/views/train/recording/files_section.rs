@@ -7,7 +7,7 @@ use decoupler_files::{
     export::RecipeFile,
     import::{FileSet, Format, Plan},
 };
-use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role, vec2};
 
 use super::{
     editor::{RecordingEditor, Use},
@@ -16,6 +16,7 @@ use super::{
 };
 use crate::window::{
     shared::{Effect, FileTask, FileWords, Shared, file_stem, sentence},
+    theme::space,
     widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
 };
 
@@ -39,6 +40,8 @@ impl RecordingEditor {
     /// Shows the files of the recording, and opens and closes them.
     pub fn files_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         section_heading_ui(ui, "Files");
+        // Above the list, which grows and shrinks.
+        self.buttons_ui(ui, effects);
         self.missing_ui(ui, effects);
         if let Some(path) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
             self.close(&path);
@@ -54,7 +57,6 @@ impl RecordingEditor {
                 progress_bar_ui(ui, "Reading", share, &format!("{:.0} %", 100.0 * share));
             }
         }
-        self.buttons_ui(ui, effects);
         if self.is_empty() {
             let button = ui.add(ghost_button("Open the sample recording"));
             let hint = "Simulated readings of a soft skin with the force on it and its position: a recording for \
@@ -110,7 +112,8 @@ impl RecordingEditor {
             } else {
                 "Open file…"
             };
-            if ui.add(ghost_button(text)).on_hover_text(FILES.description).clicked() {
+            let open = ghost_button(text).min_size(vec2(space(22), space(7)));
+            if ui.add(open).on_hover_text(FILES.description).clicked() {
                 effects.push(Effect::ChooseFile(self.open_task()));
             }
             if self.reading.is_opening() {
@@ -119,11 +122,16 @@ impl RecordingEditor {
                 }
             } else if !self.is_empty() {
                 let clear = ui.add(ghost_button("Clear"));
-                if clear
-                    .on_hover_text("Closes all files. Undo opens them again.")
+                if clear.on_hover_text("Closes all files, which can be undone.").clicked() {
+                    self.clear();
+                }
+            } else if self.cleared.is_some() {
+                let undo = ui.add(ghost_button("Undo: Clear"));
+                if undo
+                    .on_hover_text("Brings back the files and the meanings of their columns.")
                     .clicked()
                 {
-                    self.close_all();
+                    self.undo_clear();
                 }
             }
         });
