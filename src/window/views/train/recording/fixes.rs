@@ -18,14 +18,11 @@ pub struct Fix {
 }
 
 impl Fix {
-    /// Takes the changed plan, and trains again.
+    /// Takes the changed plan.
     pub fn effects(&self, shared: &Shared) -> Vec<Effect> {
         let setup = Setup::recording(shared.recording.settings, self.plan.clone());
-        vec![
-            Effect::TakeSetup(Box::new(setup)),
-            Effect::ChooseAutomatically(shared.recording.is_auto),
-            Effect::Train,
-        ]
+        let is_auto = shared.recording.is_auto;
+        vec![Effect::TakeSetup(Box::new(setup)), Effect::ChooseAutomatically(is_auto)]
     }
 
     /// Returns the problems of an import, the most urgent first.
