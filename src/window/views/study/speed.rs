@@ -484,8 +484,9 @@ mod tests {
     #[test]
     fn the_default_form_is_a_quick_look_at_all_decoders() {
         let plan = plan(&SpeedForm::default(), RunSettings::default());
-        // Five without a network, then two sizes with two precisions and polish.
-        assert_eq!(plan.points(), 2 * (5 + 2 * 3));
+        let alone = DecoderKind::ALL.iter().filter(|kind| !kind.needs_network()).count();
+        // All without a network, then two sizes with two precisions and polish.
+        assert_eq!(plan.points(), 2 * (alone + 2 * 3));
         let best = settings(&plan, 1e-3, Preset::Best);
         let simulation = best.simulation().unwrap();
         assert_eq!((simulation.samples, best.training.stopping.epochs), (2000, 60));
@@ -519,8 +520,10 @@ mod tests {
         let base = RunSettings::measured(RowModel::Shared);
         let recording = |plan: &Plan| Setup::recording(base, plan.clone());
         let of = plan(&SpeedForm::default(), recording(&Plan::default()));
-        // Mean, ridge, radial basis and fuzzy rules once; two methods with two sizes in two precisions.
-        assert_eq!(of.points(), 4 + 2 * 2 * 2);
+        let is_alone = |kind: &&DecoderKind| !kind.needs_network() && !kind.needs_sensor();
+        let alone = DecoderKind::ALL.iter().filter(is_alone).count();
+        // All with neither network nor sensor once; two methods with two sizes in two precisions.
+        assert_eq!(of.points(), alone + 2 * 2 * 2);
         assert!(of.runs.iter().all(|run| run.noise().is_none()), "no noise is simulated");
         let mut all = of.runs.iter().flat_map(|run| &run.decoders);
         assert!(all.all(|kind| !kind.needs_sensor()));

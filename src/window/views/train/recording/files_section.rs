@@ -5,7 +5,7 @@ use std::{iter::once, path::PathBuf};
 use decoupler_core::text::counted;
 use decoupler_files::{
     export::RecipeFile,
-    import::{FileSet, Plan},
+    import::{FileSet, Format, Plan},
 };
 use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role, vec2};
 
@@ -26,19 +26,14 @@ pub(super) const FILES: FileWords = FileWords {
     description: "A table of readings and targets (CSV or other text, Excel, .npy, .npz, .mat), a recipe, a network or a \
                   checkpoint. A table with the header target,x,y says where each target lies on the skin, in millimetres: \
                   then surfaces are shown.",
-    extensions: &[
-        "csv",
-        "txt",
-        "tsv",
-        "dat",
-        "npy",
-        "npz",
-        "mat",
-        "xlsx",
-        "ods",
-        "json",
-        "checkpoint",
-    ],
+    extensions: &{
+        let mut all = ["json"; Format::EXTENSIONS.len() + 2];
+        all.split_at_mut(Format::EXTENSIONS.len())
+            .0
+            .copy_from_slice(&Format::EXTENSIONS);
+        all[Format::EXTENSIONS.len() + 1] = "checkpoint";
+        all
+    },
 };
 
 impl RecordingEditor {
