@@ -96,7 +96,7 @@ impl<'a> TrainingLoop<'a> {
             let stage = self.current.as_ref().map(|current| current.stage);
             let request = match stage {
                 Some(Stage::Training | Stage::Calibrating) => requests.try_recv(),
-                _ => requests.recv().map_err(TryRecvError::from),
+                _ => self.report.waiting(|| requests.recv()).map_err(TryRecvError::from),
             };
             match request {
                 Ok(request) => self.answer(request),

@@ -11,11 +11,12 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo};
 
-use super::{LiveView, engine::Answered, view::command_ui};
+use super::{LiveView, engine::Answered};
 use crate::window::{
     plotting::{SeriesView, cells_ui},
     shared::{
-        Command, Effect, Look, Shared, card_head_ui, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui,
+        Command, Effect, Look, Shared, card_head_ui, command_button_ui, surface_cards_ui, surface_ui, target_choice_ui,
+        view_mode_ui,
     },
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
@@ -110,7 +111,9 @@ fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mu
         ui.disable();
     }
     ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-        command_ui(ui, &Command::PlayReplay, view, shared, effects);
+        let play = ghost_button(if replay.is_playing { "⏸ Pause" } else { "▶ Play" });
+        let play = play.min_size([space(18), space(6)].into());
+        command_button_ui(ui, shared, Command::PlayReplay, play, None, effects);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if let Some(speed) = segmented_ui(ui, "Replay speed", &SPEEDS, view.source.speed, false) {
                 view.source.speed = speed;

@@ -30,7 +30,7 @@ use super::{
     value_list::{label, write_percent},
 };
 use crate::window::{
-    shared::Effect,
+    shared::{Command, Effect},
     theme::space,
     widgets::{
         dim_ui, explained_options_ui,
@@ -335,7 +335,7 @@ impl Outcome for ExperimentOutcome {
         let setup = Box::new(setup_of(settings, cell.division, self.plan.as_ref()));
         match median {
             Some(trial) if !trial.states.is_empty() => vec![Effect::TakeUp(setup, trial.states.clone())],
-            Some(_) => vec![Effect::TakeSetup(setup), Effect::Train],
+            Some(_) => vec![Effect::TakeSetup(setup), Effect::Do(Command::Train)],
             None => vec![Effect::TakeSetup(setup)],
         }
     }

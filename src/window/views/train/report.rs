@@ -22,8 +22,8 @@ use super::{decoders::decoders_ui, press::press_section_ui, recording::Fix, view
 use crate::window::{
     glossary,
     shared::{
-        Effect, ExportLine, Exporting, NetworkSource, RunResult, RunView, Shared, SourceKind, ViewKind, error_table_ui,
-        sentence, targets_table_ui,
+        Command, Effect, ExportLine, Exporting, NetworkSource, RunResult, RunView, Shared, SourceKind, ViewKind,
+        command_button_ui, error_table_ui, sentence, targets_table_ui,
     },
     test_view::Skin,
     theme::{Theme, radius, space, type_size},
@@ -49,7 +49,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         ui.add_space(space(1));
         let is_old = shared.is_old(run);
         if is_old {
-            previous_ui(ui, run, effects);
+            previous_ui(ui, run, shared, effects);
         }
         let remarks = match (view.scrub.epoch(), run.stop_reason) {
             (None, Some(reason)) if !is_old => verdict_ui(ui, view, shared, (run, result, reason), effects),
@@ -92,7 +92,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             }
             details_ui(ui, view, (run, result), effects);
         });
-        use_ui(ui, run, effects);
+        use_ui(ui, run, shared, effects);
         runs_ui(ui, shared, effects);
     });
 }
@@ -101,12 +101,10 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
 pub const OLD: f32 = 0.5;
 
 /// Says that the settings have changed, with the ways out.
-fn previous_ui(ui: &mut Ui, run: &RunView, effects: &mut Vec<Effect>) {
+fn previous_ui(ui: &mut Ui, run: &RunView, shared: &Shared, effects: &mut Vec<Effect>) {
     dim_ui(ui, "Result of the previous settings.");
     ui.horizontal(|ui| {
-        if ui.add(ghost_button("Train again")).clicked() {
-            effects.push(Effect::Train);
-        }
+        command_button_ui(ui, shared, Command::Train, ghost_button("Train again"), None, effects);
         let hint = "Goes back to the settings of this result.";
         if ui.add(ghost_button("Undo changes")).on_hover_text(hint).clicked() {
             let plan = run.asked.plan.as_deref().map(|plan| (**plan).clone());
@@ -157,29 +155,24 @@ fn details_ui(ui: &mut Ui, view: &mut TrainView, (run, result): (&RunView, &RunR
 }
 
 /// What can be done with a trained network.
-fn use_ui(ui: &mut Ui, run: &RunView, effects: &mut Vec<Effect>) {
+fn use_ui(ui: &mut Ui, run: &RunView, shared: &Shared, effects: &mut Vec<Effect>) {
     section_heading_ui(ui, "Use it");
     let exporting = |line| Effect::Export(Box::new(Exporting::new(line, "")));
-    let decode = NetworkSource::of(run).decode();
-    let hint = decode.words.description;
     let live = "Decodes readings as they arrive.";
     let [network, report] = [ExportLine::Network, ExportLine::Report].map(|line| (line.words().1, exporting(line)));
     let buttons = [
-        ("Decode file…", hint, Effect::ChooseFile(decode)),
-        ("Test it live", live, Effect::Show(ViewKind::Live)),
+        ("Test it live", live, Effect::Do(Command::Show(ViewKind::Live))),
         ("Export network…", network.0, network.1),
         ("Save report…", report.0, report.1),
     ];
     let width = 0.5 * (ui.available_width() - space(1));
     ui.spacing_mut().item_spacing = [space(1); 2].into();
+    let button = |text| ghost_button(text).min_size([width, space(7)].into());
     ui.horizontal_wrapped(|ui| {
+        command_button_ui(ui, shared, Command::DecodeFile, button("Decode file…"), None, effects);
         for (text, hint, effect) in buttons {
-            let button = ghost_button(text).min_size([width, space(7)].into());
-            if ui
-                .add_enabled(run.stop_reason.is_some(), button)
-                .on_hover_text(hint)
-                .clicked()
-            {
+            let shown = ui.add_enabled(run.stop_reason.is_some(), button(text));
+            if shown.on_hover_text(hint).clicked() {
                 effects.push(effect);
             }
         }
@@ -315,7 +308,7 @@ fn verdict_ui(
             match offered {
                 Some(Offered::Fix(fix)) if is_clicked(&fix.button) => {
                     effects.extend(fix.effects(shared));
-                    effects.push(Effect::Train);
+                    effects.push(Effect::Do(Command::Train));
                 }
                 Some(Offered::UseRidge) if is_clicked("Use ridge") => effects.push(Effect::UseRidge),
                 _ => {}

@@ -15,7 +15,7 @@ use super::{
     reading::Reading,
 };
 use crate::window::{
-    job::Wake,
+    job::Jobs,
     shared::{Effect, FileInUse, FileTask, Matter, Notice, RecordingDraft, RunsRequest, Shared, SourceKind},
     training_worker::RunId,
 };
@@ -67,13 +67,13 @@ pub(super) enum Use {
 }
 
 impl RecordingEditor {
-    /// Nothing open yet. `wake` is called when there are events.
-    pub fn new(wake: &Wake) -> Self {
+    /// Nothing open yet.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             import: None,
             missing: None,
             changed: Vec::new(),
-            reading: Reading::new(Arc::clone(wake)),
+            reading: Reading::new(jobs),
             fixes: Vec::new(),
             cleared: None,
             typed: BTreeMap::new(),

@@ -15,7 +15,7 @@ use super::{
     reading::State,
 };
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Shared, file_stem, sentence},
+    shared::{Command, Effect, FileTask, FileWords, Shared, file_stem, sentence},
     theme::space,
     widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
 };
@@ -114,7 +114,7 @@ impl RecordingEditor {
             };
             let open = ghost_button(text).min_size(vec2(space(22), space(7)));
             if ui.add(open).on_hover_text(FILES.description).clicked() {
-                effects.push(Effect::ChooseFile(self.open_task()));
+                effects.push(Effect::Do(Command::OpenFiles));
             }
             if self.reading.is_opening() {
                 if ui.add(ghost_button("Cancel")).clicked() {

@@ -5,7 +5,7 @@ use eframe::egui::{RichText, Sense, Ui};
 use super::{checking::Checked, editor::RecordingEditor};
 use crate::window::{
     glossary,
-    shared::{Effect, Shared, sentence},
+    shared::{Command, Effect, Shared, sentence},
     theme::{semibold, space, type_size},
     widgets::{card_ui, dim_ui, ghost_button, invitation_ui, note_ui, scrolled_ui, section_heading_ui},
 };
@@ -27,7 +27,7 @@ impl RecordingEditor {
             card_ui(ui, whole, |ui| {
                 ui.label(RichText::new("Drop recordings here").font(semibold(type_size().title)));
                 if invitation_ui(ui, INVITATION, "Open files…", true) {
-                    effects.push(Effect::ChooseFile(self.open_task()));
+                    effects.push(Effect::Do(Command::OpenFiles));
                 }
             });
         } else {
