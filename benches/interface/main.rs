@@ -15,7 +15,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::window::{DecouplerWindow, Desktop, Effect, Phase, Shared};
+use decoupler::window::{Command, DecouplerWindow, Desktop, Effect, Phase, Shared};
 use decoupler_core::{
     dataset::Simulation,
     evaluation::RunSettings,
@@ -216,7 +216,7 @@ fn main() {
         let name = |what: &str| format!("{scale}, surfaces of {}×{}: {what}", points[0], points[1]);
         bench.measure(&name("at rest, drawn again"), |_| Vec::new());
         bench.measure(&name("pointer moves"), over_the_surfaces);
-        bench.window.apply(Effect::Train);
+        bench.window.apply(Effect::Do(Command::Train));
         bench.wait(|state| state.result().is_some());
         for chart in ["Loss", "Histogram", "Nodes", "Section"] {
             bench.show_chart(chart);
@@ -236,7 +236,7 @@ fn main() {
             }
         };
         bench.measure(&name("training, turned by hand"), turned);
-        bench.window.apply(Effect::Stop);
+        bench.window.apply(Effect::Do(Command::StopTraining));
         bench.wait(|state| matches!(state.phase, Phase::Ended(_)));
     }
     long_training();

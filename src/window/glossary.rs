@@ -129,12 +129,12 @@ terms! { NETWORK_TERMS:
          large ones, unless noise hides them.",
         "component / √(σ² + noise²)";
     STARTS = "Restarts",
-        "Number of trainings from different random weights, side by side. Several starts show how much the results vary.";
+        "Number of trainings from different random weights, side by side. Several show how much the results vary.";
     AUTO = "Automatic settings",
         "History of readings, scaling, hidden nodes, method and epochs are chosen by cross-validation on the training samples, in about a \
          minute; the answer is the best combination of ridge, kernel ridge and networks. Turned off, the form begins with the settings that were chosen.";
     COMBINE = "Combine restarts",
-        "Keep the start with the lowest validation error, or average the answers of all starts: their mean is one network \
+        "Keep the restart with the lowest validation error, or average the answers of all restarts: their mean is one network \
          with the hidden nodes of all, and varies less than any of them.";
     SEED = "Seed",
         "Seed of all random numbers: the same seed gives the same network.";
@@ -199,7 +199,7 @@ terms! { SENSOR_TERMS:
         "Samples that belong together, such as those of a snapshot or of one subject, and are never split between \
          training and test.";
     DECOUPLING = "Decoupling",
-        "Recovering the coordinates of each node from readings that each mix many nodes.";
+        "Decoding the coordinates of each node from readings that each mix many nodes.";
     HEIGHT = "Height",
         "Height of the row-wires above the column-wires, undeformed, in mm.";
     RESISTIVITY = "Resistivity",

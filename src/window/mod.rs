@@ -32,5 +32,5 @@ mod views;
 mod widgets;
 
 pub use frame::{DecouplerWindow, Desktop, OpenError, WindowFile, open};
-pub use shared::{Effect, Matter, Notice, Phase, Shared, SourceKind};
+pub use shared::{Command, Effect, Matter, Notice, Phase, Shared, SourceKind};
 pub use views::{DecoderResult, Views};

@@ -129,17 +129,21 @@ fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
     has(&read(folder.path(), "r.json"), &["\"lags\"", "\"0.5s\""]);
     let without_time = TRAIN.replace("--time t ", "");
     for (arguments, status, cause) in [
-        (format!("{without_time} --history 2s"), 2, "a memory of 2s needs times"),
+        (
+            format!("{without_time} --history 2s"),
+            2,
+            "a history of 2 s needs times",
+        ),
         (format!("{TRAIN} --history 2h"), 2, "write a number of samples as in 20"),
         (
             format!("{TRAIN} --history 0.01s"),
             2,
-            "0.01s is shorter than the usual interval",
+            "0.01 s is shorter than the usual interval",
         ),
         (
             "export --network a.json --format c99 --precision fixed16 --out c".to_owned(),
             1,
-            "no history of readings: give --precision f64 or f32",
+            "no history of readings: choose precision f64 or f32",
         ),
     ] {
         refused(&arguments, folder.path(), status, cause);

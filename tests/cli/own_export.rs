@@ -202,7 +202,7 @@ fn readings_that_single_precision_cannot_hold_are_refused_with_cause_and_remedy(
                     &message,
                     &[
                         "single precision cannot resolve",
-                        "--precision f64",
+                        "precision f64",
                         "subtract a constant",
                     ],
                 );
@@ -222,5 +222,5 @@ fn readings_that_single_precision_cannot_hold_are_refused_with_cause_and_remedy(
         assert!(number(&report, "limit") < 1e-6, "{report}");
     }
     let single = "export --network n.json --format c99 --precision f32 --out b";
-    refused(single, path, 1, "give --precision f64");
+    refused(single, path, 1, "choose precision f64");
 }

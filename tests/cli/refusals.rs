@@ -51,7 +51,7 @@ const INVALID: &[&str] = &[
     "train --noise 0,1 => is not a number",
     "train --noise 1e300 => the relative noise is 1e300: give from 0 to 1",
     "train --set noise-ohm=1e308 => from 0 to 1e150",
-    "train --decoder knn => rbf, fuzzy, newton or polish",
+    "train --decoder knn => newton or polish",
     "train --resume => --checkpoint <FILE>",
     "train --out r.html --report ./r.html => --out and --report name the same file",
     "simulate --rows 11 => row 11 does not exist: the array has rows 1 to 10",

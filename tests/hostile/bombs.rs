@@ -12,7 +12,7 @@ use zip::{ZipWriter, write::SimpleFileOptions};
 use crate::{ended, refused};
 
 /// Part of the message on a file that needs more memory than reading may take.
-const OVER_BUDGET: &str = "raise the limit with the option --memory-limit";
+const OVER_BUDGET: &str = "raise the memory limit";
 
 /// Bytes of a `.npy` file up to its numbers.
 fn npy_header(shape: &str) -> Vec<u8> {

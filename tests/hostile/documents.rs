@@ -42,7 +42,7 @@ fn documents_that_are_large_or_deeply_nested_are_refused_by_name() {
         file.set_len(400_000_000).unwrap();
         let message = refused(command, folder.path());
         assert!(
-            message.contains("file.json") && message.contains("--memory-limit"),
+            message.contains("file.json") && message.contains("memory limit"),
             "{command:?}: {message}"
         );
         for (open, close) in [("[", "]"), ("{\"a\":", "}")] {

@@ -64,7 +64,7 @@ fn a_network_is_configured_and_trained_by_keys_alone() {
     assert!(driver.says("Correlation R = "));
     tab_to(&mut driver, "Next snapshot");
     driver.press(Key::Space);
-    assert_eq!(driver.views().train.snapshot, 1);
+    assert_eq!(driver.snapshot(), 1);
     driver.act("Chart: Section");
     driver.press(Key::CloseBracket);
     assert!(driver.says("7 of 10"));

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use decoupler::window::{Effect, Phase, SourceKind};
+use decoupler::window::{Command, Effect, SourceKind};
 use decoupler_core::job::Job;
 use decoupler_files::export::CheckpointFile;
 use eframe::egui::{Key, ViewportCommand};
@@ -44,7 +44,7 @@ fn an_unfinished_training_is_asked_about_once_and_continues_if_the_user_stays() 
     driver.harness().step();
     driver.click_button(STAY);
     driver.wait_for_epochs(3);
-    assert_eq!(driver.state().phase, Phase::Training);
+    assert!(driver.is_enabled("⏸ Pause"));
 
     assert!(!driver.close());
     driver.harness().step();
@@ -89,7 +89,7 @@ fn a_training_that_ends_during_the_question_moves_no_button_and_does_not_close_t
     ask(&mut driver);
     let places = |driver: &mut Driver| [STAY, CLOSE, SAVE].map(|label| driver.get(label).rect());
     let before = places(&mut driver);
-    driver.window_mut().apply(Effect::Stop);
+    driver.window_mut().apply(Effect::Do(Command::StopTraining));
     driver.wait("the end", |driver| {
         assert!(!driver.sent(&ViewportCommand::Close), "no one has answered");
         driver.says("has ended")
@@ -158,7 +158,7 @@ fn no_study_and_no_preparation_is_ended_without_asking() {
         assert!(driver.close(), "nothing is running any more");
     }
     let mut driver = Driver::open();
-    driver.window_mut().apply(Effect::Train);
+    driver.window_mut().apply(Effect::Do(Command::Train));
     ask(&mut driver);
     assert!(driver.has("Train: Training"), "its samples are being drawn");
 }

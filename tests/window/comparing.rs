@@ -125,6 +125,18 @@ fn two_runs_are_compared_and_survive_a_restart() {
 }
 
 #[test]
+fn keys_step_through_the_snapshots_of_both_runs() {
+    let mut driver = Driver::open();
+    trained_twice(&mut driver);
+    wait_for_both(&mut driver);
+    driver.press(Key::PageDown);
+    assert_eq!(driver.snapshot(), 1);
+    driver.press(Key::PageUp);
+    assert_eq!(driver.snapshot(), 0);
+    assert!(!driver.is_enabled("Previous snapshot"));
+}
+
+#[test]
 fn a_run_is_removed_only_when_that_is_confirmed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(PLACE);

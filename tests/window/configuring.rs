@@ -227,15 +227,11 @@ fn keys_start_a_training_and_step_through_the_snapshots() {
     driver.press(Key::PageDown);
     driver.press(Key::PageDown);
     driver.press(Key::PageUp);
-    assert_eq!(driver.views().train.snapshot, 1);
+    assert_eq!(driver.snapshot(), 1);
     assert!(driver.says("2 of 10"));
     driver.press_with(Modifiers::COMMAND, Key::Enter);
     driver.wait_for_end();
-    assert_eq!(
-        driver.views().train.snapshot,
-        1,
-        "training keeps the displayed snapshot"
-    );
+    assert_eq!(driver.snapshot(), 1, "training keeps the displayed snapshot");
     driver.settle();
 }
 

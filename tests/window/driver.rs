@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::window::{DecouplerWindow, Desktop, Notice, Phase, Shared, SourceKind, Views, WindowFile};
+use decoupler::window::{DecouplerWindow, Desktop, Notice, Shared, SourceKind, Views, WindowFile};
 use decoupler_core::{
     dataset::Simulation,
     evaluation::{ErrorTable, Run, RunSettings},
@@ -632,9 +632,23 @@ impl Driver {
     /// Waits for the end of the training.
     #[track_caller]
     pub(crate) fn wait_for_end(&mut self) {
-        self.wait("the end of the training", |driver| {
-            matches!(driver.state().phase, Phase::Ended(_))
-        });
+        self.wait("the end of the training", Self::has_ended);
+    }
+
+    /// Returns true once the training has ended, for whatever reason.
+    pub(crate) fn has_ended(&self) -> bool {
+        ["Finished: ", "Stopped at epoch ", "Ended: "]
+            .into_iter()
+            .any(|ended| self.says(ended))
+    }
+
+    /// Returns the displayed snapshot of the test set, counted from 0.
+    #[track_caller]
+    pub(crate) fn snapshot(&self) -> usize {
+        let labels = ["Test snapshot", "Test sample"].into_iter();
+        let mut nodes = labels.flat_map(|label| self.harness.query_all_by_label(label));
+        let shown = nodes.find_map(|node| node.accesskit_node().numeric_value());
+        shown.expect("it is displayed") as usize - 1
     }
 
     /// Unfolds the details of the result.

@@ -2,7 +2,6 @@
 
 use std::{fs, num::NonZero};
 
-use decoupler::window::Phase;
 use decoupler_core::{
     evaluation::experiments::{
         Axis, AxisKind, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments,
@@ -126,7 +125,7 @@ const OPEN: &str = "Open in Train view";
 fn wait_for_the_network(driver: &mut Driver) {
     assert_eq!(driver.shown(), "Train");
     driver.wait("the network", |driver| {
-        matches!(driver.state().phase, Phase::Ended(_)) && driver.state().result().is_some()
+        driver.has_ended() && driver.state().result().is_some()
     });
     driver.settle();
 }

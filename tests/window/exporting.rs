@@ -115,11 +115,11 @@ fn a_form_is_closed_without_writing() {
     driver.export(ERRORS);
     driver.type_into("File", "  ");
     assert!(!driver.is_enabled("Save"), "a file needs a name");
-    let (phase, shown) = (driver.state().phase, driver.views().train.snapshot);
+    let (phase, shown) = (driver.state().phase, driver.snapshot());
     driver.press_with(Modifiers::COMMAND, Key::Enter);
     driver.press(Key::PageDown);
     assert_eq!(
-        (driver.state().phase, driver.views().train.snapshot),
+        (driver.state().phase, driver.snapshot()),
         (phase, shown),
         "nothing happens behind the form"
     );

@@ -1,6 +1,5 @@
 //! Habits: undo and redo, the list of all actions, keyboard shortcuts, the size of the interface.
 
-use decoupler::window::Phase;
 use eframe::egui::{Key, Modifiers, vec2};
 
 use crate::{driver::Driver, training::start_endless};
@@ -43,7 +42,7 @@ fn the_settings_of_a_running_training_cannot_be_undone() {
     pause(&mut driver);
     start_endless(&mut driver);
     let held = driver.state().draft;
-    assert!(driver.state().phase.is_busy());
+    assert!(driver.has("■ Stop"));
     driver.press_with(UNDO.0, UNDO.1);
     assert_eq!(driver.state().draft, held);
 }
@@ -53,9 +52,8 @@ fn the_list_finds_an_action_by_a_few_letters_or_arrows_and_runs_it() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.press_with(Modifiers::COMMAND, Key::Enter);
-    assert_eq!(
-        driver.state().phase,
-        Phase::Idle,
+    assert!(
+        driver.says("Ready: press Train"),
         "while it is open, other keys do nothing"
     );
     driver.type_into("Action", "show");
@@ -88,6 +86,31 @@ fn every_listed_key_works() {
     assert!(!driver.says("PageDown"));
     driver.press_with(Modifiers::COMMAND, Key::Num2);
     assert_eq!(driver.shown(), "Study");
+}
+
+#[test]
+fn buttons_keys_and_the_list_agree_on_what_is_available() {
+    let listed = |driver: &mut Driver, action: &str| {
+        driver.press_with(Modifiers::COMMAND, Key::K);
+        driver.type_into("Action", action);
+        let is_enabled = driver.is_enabled(action);
+        driver.press(Key::Escape);
+        is_enabled
+    };
+    let mut driver = Driver::open();
+    assert!(!driver.has("■ Stop") && !listed(&mut driver, "Stop training"));
+    assert!(driver.is_enabled("▶ Train") && listed(&mut driver, "Open files"));
+    driver.press_with(Modifiers::COMMAND, Key::K);
+    driver.type_into("Action", "Stop training");
+    driver.get("Stop training").hover();
+    driver.wait("the reason", |driver| driver.says("No training is running."));
+    driver.press(Key::Escape);
+    start_endless(&mut driver);
+    assert!(driver.has("■ Stop") && listed(&mut driver, "Stop training"));
+    assert!(!driver.is_enabled("▶ Train") && !listed(&mut driver, "Open files"));
+    driver.press_with(Modifiers::COMMAND, Key::Period);
+    driver.wait_for_end();
+    assert!(!driver.has("■ Stop") && driver.is_enabled("▶ Train"));
 }
 
 #[test]
@@ -128,11 +151,14 @@ fn undo_says_what_it_undid_and_shows_it() {
     driver.act("Undo change of settings");
     driver.settle();
     driver.assert_says("Undone: hidden");
-    assert_eq!((driver.shown(), driver.state().draft.hidden), ("Train", 12));
+    assert_eq!(
+        (driver.shown(), driver.get("Hidden nodes").value().as_deref()),
+        ("Train", Some("12"))
+    );
     driver.act("Redo change of settings");
     driver.settle();
     driver.assert_says("Redone: hidden");
-    assert_eq!(driver.state().draft.hidden, 7);
+    assert_eq!(driver.get("Hidden nodes").value().as_deref(), Some("7"));
     driver.harness().run_steps(80);
     driver.choose("Preset", "Best accuracy");
     driver.harness().run_steps(80);

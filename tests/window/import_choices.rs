@@ -4,7 +4,7 @@ use std::{fmt::Write as _, fs, path::Path};
 
 use decoupler_core::dataset::SplitBy;
 use decoupler_files::{export::RecipeFile, import::Plan};
-use eframe::egui::{Event, Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhase, vec2};
+use eframe::egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhase, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use tempfile::TempDir;
 
@@ -168,6 +168,45 @@ fn choose_test_file(driver: &mut Driver, path: &Path) {
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Open");
     driver.settle();
+}
+
+#[test]
+fn selected_columns_get_a_meaning_together() {
+    let mut text = "a,b,c,d,e,f,force (N)\n".to_owned();
+    for row in 0..40 {
+        let cells = (0..7).map(|column| ((row * (column + 3) + column) % 11).to_string());
+        text += &(Vec::from_iter(cells).join(",") + "\n");
+    }
+    let (mut driver, _path, _folder) = opened_text(&text);
+    let select = |driver: &mut Driver, name: &str, held: Modifiers| {
+        let harness = driver.harness();
+        harness.get_by_label(&format!("Select {name}")).click_modifiers(held);
+        harness.run_steps(3);
+        driver.settle();
+    };
+    let all = |driver: &Driver| ["a", "b", "c", "d", "e", "f"].map(|name| meaning(driver, name).unwrap());
+    // A range, and one more.
+    select(&mut driver, "b", Modifiers::NONE);
+    select(&mut driver, "d", Modifiers::SHIFT);
+    select(&mut driver, "f", Modifiers::COMMAND);
+    driver.mean("c", "target");
+    assert_eq!(all(&driver), ["input", "target", "target", "target", "input", "target"]);
+    // A meaning that only one column can have is not given to all.
+    driver.mean("f", "group");
+    assert_eq!(all(&driver), ["input", "target", "target", "target", "input", "group"]);
+    // A column that is not selected changes alone.
+    driver.mean("a", "unused");
+    assert_eq!(all(&driver), ["unused", "target", "target", "target", "input", "group"]);
+    // By the keyboard.
+    driver.get("Select a").focus();
+    driver.settle();
+    driver.press(Key::Space);
+    driver.get("Select b").focus();
+    driver.settle();
+    driver.press_with(Modifiers::SHIFT, Key::Space);
+    driver.settle();
+    driver.mean("b", "input");
+    assert_eq!(all(&driver), ["input", "input", "target", "target", "input", "group"]);
 }
 
 #[test]

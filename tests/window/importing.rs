@@ -6,10 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler::window::{Notice, Phase, SourceKind};
+use decoupler::window::SourceKind;
 use decoupler_core::{network::ScalingChoice, scene::RowModel};
 use decoupler_files::export::NetworkFile;
-use eframe::egui::{self, accesskit::Role, vec2};
+use eframe::egui::{self, Rect, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::{
@@ -127,12 +127,16 @@ fn the_source_selects_the_form_and_keeps_the_settings_of_the_other() {
     driver.click_button("Recording");
     assert!(!driver.has("Array scale") && driver.has("Drop recordings here"));
     assert_eq!(driver.state().settings().hidden, 12);
-    driver.click("▶ Train");
-    assert!(
-        matches!(driver.notice(), Some(Notice::Failed(reason)) if reason.contains("Open a recording first")),
-        "{:?}",
-        driver.notice()
+    // Train is not possible yet; the reason is next to it.
+    assert!(!driver.is_enabled("▶ Train"));
+    let (reason, train) = (
+        "Open a recording first: drop files on the window.",
+        driver.get("▶ Train").rect(),
     );
+    let texts = driver.harness().get_all_by_label(reason);
+    let places = Vec::from_iter(texts.map(|text| text.rect()));
+    let is_next_to_it = |place: &Rect| train.y_range().contains(place.center().y) && place.right() <= train.left();
+    assert!(places.iter().any(is_next_to_it), "{places:?}");
     driver.choose_by_hand();
     driver.enter("Hidden nodes", "5");
     driver.unfold_to("Advanced", "Scaling");
@@ -232,9 +236,9 @@ fn files_dropped_while_a_training_runs_change_nothing() {
     driver.wait("an epoch", |driver| driver.state().result().is_some());
     driver.drop_files(&[&other]);
     driver.wait("the refusal", |driver| {
-        driver.says("A training is running: stop it before you open other files.")
+        driver.says("A training is running: stop it first.")
     });
-    assert_eq!(driver.state().phase, Phase::Training);
+    assert!(driver.is_enabled("⏸ Pause"));
     driver.click("■ Stop");
     driver.wait_for_end();
     driver.settle();
@@ -288,6 +292,34 @@ fn undo_restores_a_meaning() {
     });
     driver.settle();
     assert_eq!(driver.plan().import.targets, ["x", "y"]);
+}
+
+#[test]
+fn cleared_files_are_brought_back_with_a_click_where_clear_was() {
+    let (mut driver, path, _folder) = opened(40);
+    driver.mean("y", "unused");
+    pause(&mut driver);
+    let plan = |driver: &Driver| driver.state().setup().map(|setup| setup.plan().cloned());
+    let before = plan(&driver);
+    let place = driver.get("Clear").rect();
+    driver.click_button("Clear");
+    driver.settle();
+    assert!(plan(&driver).is_err() && driver.has("Drop recordings here"));
+    assert_eq!(driver.get("Undo: Clear").rect().left_top(), place.left_top());
+    driver.click_button("Undo: Clear");
+    driver.wait("the samples", |driver| driver.says("Test: "));
+    assert_eq!(plan(&driver), before);
+    assert_meanings(&driver, &[("y", "unused")]);
+
+    // So does undoing by the keyboard; closing the last file is the same.
+    pause(&mut driver);
+    driver.click(&format!("Close {}", path.file_name().unwrap().display()));
+    pause(&mut driver);
+    assert!(driver.has("Undo: Clear"));
+    driver.press_with(egui::Modifiers::COMMAND, egui::Key::Z);
+    driver.wait("the samples", |driver| driver.says("Test: "));
+    assert!(driver.says("Undone: Clear"), "{:?}", driver.notice());
+    assert_eq!(plan(&driver), before);
 }
 
 #[test]
@@ -448,6 +480,11 @@ fn a_column_of_groups_divides_the_samples_by_them() {
     let (mut driver, _path, _folder) = opened_text(&text);
     driver.assert_says("group, 20 % test");
     assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
+    // Whole sessions are another share than the one asked for.
+    driver.unfold_to("Samples", "Test share");
+    driver.enter("Test share", "30");
+    driver.wait("two sessions", |driver| driver.says("group, 40 % test"));
+    driver.enter("Test share", "20");
     // Another group replaces it, and without one the samples are divided by time.
     driver.mean("u", "group");
     assert_meanings(&driver, &[("session", "unused")]);

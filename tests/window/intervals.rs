@@ -2,12 +2,11 @@
 
 use std::{fmt::Write as _, path::Path};
 
-use decoupler::window::{Effect, Phase};
+use decoupler::window::{Command, Effect, Phase};
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{Coverage, Intervals},
     job::Job,
-    training::StopReason,
 };
 use decoupler_files::export::format_number;
 use rand::{RngExt as _, SeedableRng as _, rngs::ChaCha8Rng};
@@ -71,7 +70,7 @@ fn pausing_after_the_last_epoch_keeps_the_intervals() {
     driver.limit_epochs("20");
     train_to_calibration(&mut driver);
     // As if clicked before the window knew.
-    driver.window_mut().apply(Effect::Pause);
+    driver.window_mut().apply(Effect::Do(Command::PauseTraining));
     driver.wait_for_training();
     driver.wait_for_kept_run();
     driver.details();
@@ -88,10 +87,10 @@ fn stopping_a_calibration_keeps_the_network_without_intervals() {
     train_to_calibration(&mut driver);
     driver.assert_says("Calibrating the 90 % intervals");
     // As if clicked, but in this frame: on a busy machine a frame takes long.
-    driver.window_mut().apply(Effect::Stop);
+    driver.window_mut().apply(Effect::Do(Command::StopTraining));
     driver.wait_for_training();
     driver.wait_for_kept_run();
-    assert_ne!(driver.state().phase, Phase::Ended(StopReason::Stopped));
+    assert!(!driver.says("Stopped at epoch"));
     driver.details();
     driver.assert_has("No 90 % intervals: interrupted.");
     assert_eq!(driver.kept(0).intervals, None);

@@ -2,8 +2,6 @@
 
 use std::{fs, path::Path, time::Instant};
 
-use decoupler::window::{Effect, Phase};
-use decoupler_core::training::StopReason;
 use decoupler_files::export::{CheckpointFile, CheckpointPlace};
 
 use crate::{
@@ -73,7 +71,7 @@ fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
     driver.click("Resume");
     driver.wait("its epochs", |driver| driver.epochs() > epoch);
     driver.wait_for_epochs(3);
-    assert!(driver.state().phase == Phase::Training && !driver.says(OFFER));
+    assert!(driver.is_enabled("⏸ Pause") && !driver.says(OFFER));
     assert_eq!(driver.state().draft, endless());
     // Cut short again, it is offered again.
     kill(driver, folder, 1);
@@ -85,7 +83,7 @@ fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
     driver.click_button("Cancel");
     driver.click("■ Stop");
     driver.wait("the end", |driver| {
-        driver.state().phase == Phase::Ended(StopReason::Stopped) && checkpoints(folder).is_empty()
+        driver.says("Stopped at epoch") && checkpoints(folder).is_empty()
     });
     drop(driver);
     assert!(nothing_is_offered_in(folder));
@@ -121,7 +119,7 @@ fn two_windows_keep_their_trainings_apart() {
     start_endless(&mut second);
     second.wait("another checkpoint", |_| checkpoints(folder).len() == 2);
     assert!(!second.says(OFFER), "the other window is at work on it");
-    second.window_mut().apply(Effect::Stop);
+    second.click("■ Stop");
     second.wait("its end", |_| checkpoints(folder) == ["training-1.checkpoint"]);
     kill((first, second), folder, 1);
     let driver = offered_in(folder);
@@ -152,7 +150,7 @@ fn a_damaged_checkpoint_is_reported_and_can_be_discarded() {
     });
     driver.click("Resume");
     driver.wait("the same again", |driver| {
-        driver.state().phase == Phase::Idle && driver.says("cannot be resumed")
+        driver.says("Ready: press Train") && driver.says("cannot be resumed")
     });
     driver.click("Discard");
     driver.wait("the removal", |_| checkpoints(folder).is_empty());

@@ -6,7 +6,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler::window::Phase;
 use decoupler_core::{evaluation::RunSettings, scene::RowModel};
 use decoupler_files::import::{Plan, Recipe, Setup};
 use eframe::egui::{self, accesskit::Role};
@@ -83,7 +82,7 @@ impl Driver {
     pub(crate) fn wait_for_training(&mut self) {
         self.wait("the end of the training", |driver| {
             let result = driver.state().result();
-            matches!(driver.state().phase, Phase::Ended(_)) && result.is_some_and(|result| result.is_idle)
+            driver.has_ended() && result.is_some_and(|result| result.is_idle)
         });
         self.settle();
     }

@@ -285,7 +285,7 @@ fn the_wheel_zooms_the_values_over_time_and_a_click_goes_to_a_sample() {
     driver.harness().drag_at(middle);
     driver.harness().drop_at(middle);
     driver.settle();
-    let sample = driver.views().train.snapshot;
+    let sample = driver.snapshot();
     assert!((8..=16).contains(&sample), "{sample}");
     driver.harness().event(eframe::egui::Event::MouseWheel {
         unit: eframe::egui::MouseWheelUnit::Point,

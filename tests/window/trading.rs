@@ -15,7 +15,7 @@ use decoupler_files::{export::format_percent, figure::point_name, import::Setup}
 use crate::{
     driver::Driver,
     experiments::wait_for_the_end,
-    sources::{Opened, open_small},
+    sources::{Opened, open_small, trained_small},
     training::endless,
 };
 
@@ -238,6 +238,33 @@ fn a_measurement_waits_while_a_training_would_distort_its_times() {
     wait_for_the_end(&mut driver);
     assert!(!driver.says("would distort the times"));
     driver.assert_says("Speed against accuracy finished: 16 points in ");
+}
+
+#[test]
+fn a_measurement_waits_for_the_work_of_another_view_and_names_it() {
+    let mut driver = trained_small(SourceKind::Array).driver;
+    driver.wait_for_kept_run();
+    driver.click_button("Study");
+    driver.click(TOPIC);
+    tiny(&mut driver);
+    driver.click_button("Live");
+    driver.click("▶ Start");
+    driver.click_button("Study");
+    driver.click("▶ Run");
+    driver.wait("the note", |driver| {
+        driver.says("Waiting: live decoding is under way and would distort the times.")
+    });
+    driver.harness().run_steps(20);
+    assert!(!driver.has("Point Ridge, paper preset"), "nothing is measured");
+    driver.click_button("Live");
+    driver.click("■ Stop");
+    driver.click_button("Study");
+    wait_for_the_end(&mut driver);
+    assert!(
+        driver.says("Speed against accuracy finished: 16 points in "),
+        "{:#?}",
+        driver.texts()
+    );
 }
 
 #[test]

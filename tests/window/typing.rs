@@ -51,7 +51,7 @@ fn invalid_values_are_rejected_in_place_and_the_old_value_stays() {
     }
     driver.enter("Hidden nodes", "7");
     assert!(!driver.says("too small: at least 1"), "the next number settles it");
-    assert_eq!(driver.state().draft.hidden, 7);
+    assert_eq!(driver.get("Hidden nodes").value().as_deref(), Some("7"));
 }
 
 #[test]
@@ -126,10 +126,10 @@ pub(crate) fn double_click_slider(driver: &mut Driver, name: &str) {
 fn a_double_click_sets_the_default_value() {
     let mut driver = Driver::open();
     driver.enter("Hidden nodes", "33");
-    assert_eq!(driver.state().draft.hidden, 33);
+    assert_eq!(driver.get("Hidden nodes").value().as_deref(), Some("33"));
     let at = driver.get("Hidden nodes").rect().center();
     double_click(&mut driver, at);
-    assert_eq!(driver.state().draft.hidden, 12);
+    assert_eq!(driver.get("Hidden nodes").value().as_deref(), Some("12"));
 }
 
 #[test]

@@ -18,9 +18,9 @@
 //! | [`network`] | the three-layer network, its initialisation and scaling |
 //! | [`settings`] | the table of settings: name, help, range and access of each |
 //! | [`training`] | methods, the stepped [`training::Trainer`], stop reasons |
-//! | [`decoupling`] | readings to deformation by every decoder, behind one trait |
 //! | [`surface`] | smooth surfaces through the nodes |
 //! | [`problem`] | names and units of readings and targets, and what else is known: positions, memory, sensor |
+//! | [`decoupling`] | readings to deformation by every decoder, behind one trait |
 //! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`live`] | arithmetic on frames as they arrive: re-zero, drift, faults named from the residual |
 //!

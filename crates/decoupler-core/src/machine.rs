@@ -40,7 +40,7 @@ impl fmt::Display for MemoryBudget {
         let (gigabytes, variable) = (self.bytes() as f64 * 1e-9, Self::VARIABLE);
         match self {
             Self::System(_) => write!(f, "the machine has {gigabytes:.1} GB"),
-            Self::User(_) => write!(f, "--memory-limit or {variable} allows {gigabytes:.1} GB"),
+            Self::User(_) => write!(f, "the memory limit ({variable}) is {gigabytes:.1} GB"),
             Self::Assumed(_) => write!(
                 f,
                 "{gigabytes:.1} GB are assumed, since the system does not report its memory (set the environment variable \

@@ -14,7 +14,7 @@ use crate::window::{
         SourceKind, ToCopy, ViewKind,
     },
     theme,
-    training_worker::{LOST, Origin, Request, RunView, TrainedRun},
+    training_worker::{LOST, Origin, Request, RunView, TrainedRun, Worker},
     views::CHECKPOINT,
 };
 use decoupler_core::{evaluation::RunSettings, training::StopReason};
@@ -43,15 +43,8 @@ impl DecouplerWindow {
             Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
             Effect::ChooseSource(_) => {}
             Effect::TakeSetup(setup) => self.take_setup(&setup),
-            Effect::Show(view) => self.show(view),
+            Effect::Do(command) => self.carry_out(&command),
             Effect::OpenRun(id) => self.open_run(id, true),
-            Effect::Train => match shared.setup() {
-                Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
-                    self.begin(Origin::Chosen(Box::new(setup)));
-                }
-                Ok(setup) => self.begin(Origin::New(Box::new(setup))),
-                Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
-            },
             // A training may have begun in the same frame.
             Effect::OpenTraining(_) | Effect::TakeUp(..) if shared.phase.is_busy() => {}
             Effect::OpenTraining(path) => self.begin(Origin::File(path)),
@@ -59,35 +52,7 @@ impl DecouplerWindow {
                 self.take_setup(&setup);
                 self.begin(Origin::States(setup, states));
             }
-            Effect::Pause => {
-                shared.phase = Phase::Paused;
-                self.worker.ask(Request::Pause);
-            }
-            Effect::Resume => {
-                // The settings on the left are always those of the running training.
-                if let Some(run) = &mut shared.run {
-                    run.is_saved = false;
-                    let training = run.asked.settings.training;
-                    shared.set_training(training);
-                }
-                shared.phase = Phase::Training;
-                self.worker.ask(Request::Resume);
-            }
-            Effect::Continue if shared.can_continue() => {
-                shared.phase = Phase::Training;
-                self.notices.settle(Matter::Training);
-                self.notices.settle(Matter::Settings);
-                self.worker.ask(Request::Continue(shared.settings().training));
-            }
-            Effect::Continue => {}
             Effect::UseRidge => self.worker.ask(Request::UseRidge),
-            Effect::Stop => {
-                self.worker.ask(Request::Stop);
-                // The training being prepared does not begin; the previous one stays.
-                if shared.phase == Phase::Preparing {
-                    shared.phase = shared.phase_at_rest();
-                }
-            }
             Effect::Look(look) => self.look(look),
             Effect::ChooseFile(task) => {
                 if !self.dialogs.ask(&task) {
@@ -173,7 +138,7 @@ impl DecouplerWindow {
 
     /// Starts the worker again after it died.
     pub(super) fn restart_worker(&mut self) {
-        self.worker.restart(Arc::clone(&self.wake));
+        self.worker = Worker::start(&self.jobs);
         self.keep_trainings();
     }
 

@@ -1,3 +1,5 @@
+use std::path::Path;
+
 use decoupler_core::text::counted;
 use eframe::egui::{Align, Layout, RichText, Ui, ViewportCommand};
 
@@ -15,7 +17,7 @@ use crate::window::{
 #[derive(Debug)]
 pub(super) struct Closing {
     /// The work that was unfinished when the user was asked: its lines keep their places.
-    lines: Vec<(&'static str, String)>,
+    lines: Vec<String>,
     /// True if the running training can be saved.
     can_save: bool,
     /// True once the user has decided to close.
@@ -40,7 +42,7 @@ impl DecouplerWindow {
             let is_trained = matches!(self.shared.phase, Phase::Training | Phase::Paused | Phase::Calibrating);
             self.modal = Some(Modal::Closing(Closing {
                 can_save: self.keeping.is_some() && is_trained && unfinished_training(&self.shared).is_some(),
-                lines: Vec::from_iter(unfinished.into_iter().map(|(place, work, _)| (place, work))),
+                lines: Vec::from_iter(unfinished.into_iter().map(|work| work.name)),
                 is_decided: false,
             }));
         }
@@ -63,22 +65,19 @@ impl DecouplerWindow {
         }
     }
 
-    /// Returns the work that closing would cut short: its place, its name and its progress.
-    pub(super) fn unfinished(&mut self) -> Vec<(&'static str, String, String)> {
-        let named = |place, Unfinished { work, progress }| (place, work.to_owned(), progress);
-        let training = unfinished_training(&self.shared);
-        let mut all = Vec::from_iter(training.map(|work| named(ViewKind::Train.name(), work)));
+    /// Returns the work that closing would cut short.
+    pub(super) fn unfinished(&mut self) -> Vec<Unfinished> {
+        let mut all = Vec::from_iter(unfinished_training(&self.shared));
         for view in ViewKind::ALL {
-            let held = self.views.get(view).holdings(&self.shared);
-            all.extend(held.unfinished.into_iter().map(|work| named(view.name(), work)));
+            all.extend(self.views.get(view).holdings(&self.shared).unfinished);
         }
-        let files = self.files.paths().map(|path| path.display().to_string());
-        all.extend(files.map(|path| ("File", path, "is being written and will be finished".to_owned())));
+        let written = |path: &Path| Unfinished::new("File", path.display(), "is being written and will be finished");
+        all.extend(self.files.paths().map(written));
         let runs = &self.shared.runs;
         if runs.path.is_some() && runs.unwritten > 0 {
             let count = counted(runs.unwritten as u64, "run");
             let progress = format!("{count} could not be written to the folder of runs");
-            all.push(("Run list", "Unwritten runs".to_owned(), progress));
+            all.push(Unfinished::new("Run list", "Unwritten runs", progress));
         }
         all
     }
@@ -95,19 +94,19 @@ fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
             format!("epoch {epoch} of {}", run.settings().training.stopping.epochs)
         }
     };
-    Some(Unfinished::new("Training", progress))
+    Some(Unfinished::new("Train", "Training", progress))
 }
 
 /// Lists the unfinished work and asks.
-pub(super) fn closing_ui(ui: &Ui, closing: &Closing, unfinished: &[(&'static str, String, String)]) -> Option<Reply> {
+pub(super) fn closing_ui(ui: &Ui, closing: &Closing, unfinished: &[Unfinished]) -> Option<Reply> {
     card_ui(ui, "closing", space(150), |ui| {
         ui.label(RichText::new("Close with unsaved work?").font(semibold(type_size().title)));
         ui.add_space(space(1));
-        for (place, work) in &closing.lines {
-            let now = unfinished.iter().find(|(of, now, _)| of == place && now == work);
+        for name in &closing.lines {
+            let now = unfinished.iter().find(|now| now.name == *name);
             ui.horizontal(|ui| {
-                ui.label(RichText::new(format!("{place}: {work}")).font(semibold(type_size().body)));
-                dim_ui(ui, now.map_or("has ended", |(_, _, progress)| progress));
+                ui.label(RichText::new(name).font(semibold(type_size().body)));
+                dim_ui(ui, now.map_or("has ended", |now| &now.progress));
             });
         }
         ui.add_space(space(3));

@@ -12,7 +12,10 @@ use super::{
 };
 use crate::window::{
     forms::preset_between,
-    shared::{Command, Effect, Look, Matter, Notice, Offer, Offers, RecordingDraft, Shared, SourceKind, ViewKind},
+    shared::{
+        Command, Effect, Look, Matter, Notice, Offer, Offers, Phase, RecordingDraft, Shared, SourceKind, ViewKind,
+    },
+    training_worker::{Origin, Request},
 };
 
 /// Interface scales offered to the user, relative to the default.
@@ -23,19 +26,20 @@ const STEP: f32 = 0.1;
 
 impl DecouplerWindow {
     /// Offers the commands of the current view and of the window, and carries out those that the user asked for.
-    pub(super) fn take_commands(&mut self, ctx: &Context, effects: &mut Vec<Effect>) -> Vec<Offer> {
+    pub(super) fn take_commands(&mut self, ctx: &Context, effects: &mut Vec<Effect>) {
         // On many keyboards plus is the shifted equals sign.
         if self.modal.is_none() && ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Equals)) {
             self.picked = Some(Command::Larger);
         }
         let is_listed = self.picked.is_some() || matches!(self.modal, Some(Modal::Palette(_)));
-        let mut offers = Offers::new(ctx, self.picked.take(), self.modal.is_none());
+        let mut offers = Offers::new(ctx, &self.shared, self.picked.take(), self.modal.is_none());
         let mut take = |kind: ViewKind, offers: &mut Offers<'_>, effects: &mut Vec<Effect>| {
             let view = self.views.get(kind);
             view.take_commands(offers, &self.shared, effects);
             // These have no keys, and take longer to list.
             for shown in is_listed.then(|| view.shown(&self.shared)).into_iter().flatten() {
-                if offers.offer(Command::Export(shown.action()), shown.item.is_ok()) {
+                let why_not = shown.item.as_ref().err();
+                if offers.offer_unless(Command::Export(shown.action()), why_not) {
                     effects.push(shown.ask());
                 }
             }
@@ -46,53 +50,90 @@ impl DecouplerWindow {
         for other in ViewKind::ALL {
             if other != kind && is_listed {
                 // Nothing is picked, and no key is heard.
-                let mut listed = Offers::new(ctx, None, false);
+                let mut listed = Offers::new(ctx, &self.shared, None, false);
                 take(other, &mut listed, &mut Vec::new());
                 let of = Some(other);
                 of_others.extend(listed.into_list().into_iter().map(|offer| Offer { of, ..offer }));
             }
         }
-        for (command, is_possible) in self.commands() {
-            if offers.offer(command.clone(), is_possible) {
-                self.carry_out(&command);
-            }
-        }
-        let mut list = offers.into_list();
-        list.extend(of_others);
-        list
+        let mut commands = self.commands();
+        commands.retain(|command| offers.offer_unless(command.clone(), self.own_obstacle(command)));
+        self.shared.offers = offers.into_list();
+        self.shared.offers.extend(of_others);
+        commands.iter().for_each(|command| self.carry_out(command));
     }
 
-    /// Returns the commands of the window, and whether each is possible now.
-    fn commands(&self) -> Vec<(Command, bool)> {
-        let (shared, look) = (&self.shared, self.shared.look);
-        // The settings of a running training cannot change.
-        let is_free = !shared.phase.is_busy();
-        let drafts = drafts(shared);
-        let scale = self.ctx.zoom_factor();
-        let mut commands = vec![
-            (Command::Undo, is_free && self.undoer.has_undo(&drafts)),
-            (Command::Redo, is_free && self.undoer.has_redo(&drafts)),
-        ];
-        commands.extend(ViewKind::ALL.map(|view| (Command::Show(view), view != shared.shown)));
-        commands.push((if look.is_dark { Command::Light } else { Command::Dark }, true));
-        commands.extend(SequentialMap::ALL.map(|map| (Command::Colours(map), map != look.colours)));
-        commands.extend([
-            (Command::Larger, scale < *SCALES.end() - 0.5 * STEP),
-            (Command::Smaller, scale > *SCALES.start() + 0.5 * STEP),
-            (Command::UsualSize, (scale - 1.0).abs() > 0.5 * STEP),
-            (Command::Form, self.ctx.content_rect().width() < SMALL),
-            (Command::Search, true),
-            (Command::Keys, true),
-            (Command::Glossary, true),
-            (Command::About, true),
-        ]);
+    /// Returns the commands of the window.
+    fn commands(&self) -> Vec<Command> {
+        let is_dark = self.shared.look.is_dark;
+        let mut commands = vec![Command::Undo, Command::Redo];
+        commands.extend(ViewKind::ALL.map(Command::Show));
+        commands.push(if is_dark { Command::Light } else { Command::Dark });
+        commands.extend(SequentialMap::ALL.map(Command::Colours));
+        commands.extend([Command::Larger, Command::Smaller, Command::UsualSize, Command::Form]);
+        commands.extend([Command::Search, Command::Keys, Command::Glossary, Command::About]);
         commands
     }
 
-    /// Carries out a command of the window.
+    /// Returns the reason why a command of the window is not available now that the shared state does not know.
+    fn own_obstacle(&self, command: &Command) -> Option<&'static str> {
+        let scale = self.ctx.zoom_factor();
+        let (is_met, obstacle) = match command {
+            Command::Undo => (self.undoer.has_undo(&drafts(&self.shared)), "Nothing has changed."),
+            Command::Redo => (self.undoer.has_redo(&drafts(&self.shared)), "Nothing was undone."),
+            Command::Larger => (scale < *SCALES.end() - 0.5 * STEP, "It is as large as possible."),
+            Command::Smaller => (scale > *SCALES.start() + 0.5 * STEP, "It is as small as possible."),
+            Command::UsualSize => ((scale - 1.0).abs() > 0.5 * STEP, "It has this size."),
+            Command::Form => (
+                self.ctx.content_rect().width() < SMALL,
+                "In a window of this width they are always shown.",
+            ),
+            _ => return None,
+        };
+        (!is_met).then_some(obstacle)
+    }
+
+    /// Carries out a command of the training or of the window.
     pub(super) fn carry_out(&mut self, command: &Command) {
-        let look = self.shared.look;
+        let shared = &mut self.shared;
+        let look = shared.look;
         match command {
+            Command::Train => match shared.setup() {
+                Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
+                    self.begin(Origin::Chosen(Box::new(setup)));
+                }
+                Ok(setup) => self.begin(Origin::New(Box::new(setup))),
+                Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
+            },
+            // The settings may have changed in the same frame.
+            Command::TrainLonger if command.obstacle(shared).is_some() => {}
+            Command::TrainLonger => {
+                shared.phase = Phase::Training;
+                self.notices.settle(Matter::Training);
+                self.notices.settle(Matter::Settings);
+                self.worker.ask(Request::Continue(shared.settings().training));
+            }
+            Command::PauseTraining if shared.phase == Phase::Paused => {
+                // The settings on the left are always those of the running training.
+                if let Some(run) = &mut shared.run {
+                    run.is_saved = false;
+                    let training = run.asked.settings.training;
+                    shared.set_training(training);
+                }
+                shared.phase = Phase::Training;
+                self.worker.ask(Request::Resume);
+            }
+            Command::PauseTraining => {
+                shared.phase = Phase::Paused;
+                self.worker.ask(Request::Pause);
+            }
+            Command::StopTraining => {
+                self.worker.ask(Request::Stop);
+                // The training being prepared does not begin; the previous one stays.
+                if shared.phase == Phase::Preparing {
+                    shared.phase = shared.phase_at_rest();
+                }
+            }
             Command::Undo => {
                 let earlier = self.undoer.undo(&drafts(&self.shared)).cloned();
                 self.take_drafts("Undone", earlier);
@@ -177,6 +218,7 @@ fn difference(before: &Drafts, after: &Drafts) -> String {
     names.retain(|setting| setting.get(&a) != setting.get(&b));
     match &names[..] {
         _ if before.0 != after.0 => "source of the samples".to_owned(),
+        [] if after.2.plan == Err(RecordingDraft::NOTHING_OPEN.to_owned()) => "Clear".to_owned(),
         [] if before.2.plan != after.2.plan => "import".to_owned(),
         [] if before.2.is_auto != after.2.is_auto => "automatic settings".to_owned(),
         [] if a.source != b.source => "sensor or scene".to_owned(),

@@ -56,13 +56,9 @@ impl DecouplerWindow {
             }
         }
         let mut effects = Vec::new();
-        let mut working = Vec::new();
         for kind in ViewKind::ALL {
-            let view = self.views.get(kind);
-            view.take_events(&self.shared, &mut effects);
-            working.extend(view.holdings(&self.shared).is_computing.then_some(kind));
+            self.views.get(kind).take_events(&self.shared, &mut effects);
         }
-        self.shared.working = working;
         self.apply_all(effects);
         self.take_close_request();
     }

@@ -5,7 +5,6 @@ use std::{
     fmt::{self, Display},
     path::{Path, PathBuf},
     pin::Pin,
-    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -25,8 +24,8 @@ use super::{
 use crate::{
     signals::on_termination,
     window::{
-        job::{Background, JobError, Wake, start_thread},
-        shared::{FileInUse, FileTask, Matter, ViewKind, refuse_in_use},
+        job::{Background, JobError, Jobs, start_thread},
+        shared::{Command, FileInUse, FileTask, Matter, ViewKind, refuse_in_use},
         theme::{Theme, radius, space, type_size},
     },
 };
@@ -37,15 +36,15 @@ const LONGEST_WAIT: Duration = Duration::from_secs(5);
 /// Jobs on threads of their own, each with what it is about.
 struct Pending<K, E> {
     name: &'static str,
-    wake: Wake,
+    all: Jobs,
     jobs: Vec<(K, Background<E>)>,
 }
 
 impl<K, E: Send + 'static> Pending<K, E> {
-    /// None yet. `wake` is called when one has ended.
-    fn new(name: &'static str, wake: Wake) -> Self {
+    /// None yet.
+    fn new(name: &'static str, all: Jobs) -> Self {
         let jobs = Vec::new();
-        Self { name, wake, jobs }
+        Self { name, all, jobs }
     }
 
     fn start<T: 'static>(
@@ -54,8 +53,8 @@ impl<K, E: Send + 'static> Pending<K, E> {
         work: impl FnOnce() -> T + Send + 'static,
         last: fn(Result<T, JobError>) -> E,
     ) {
-        let mut job = Background::prompt(self.name, Arc::clone(&self.wake));
-        job.start(move |_| work(), last);
+        let mut job = Background::prompt(self.name, &self.all);
+        job.start(move |report| report.waiting(work), last);
         self.jobs.push((about, job));
     }
 
@@ -94,9 +93,9 @@ pub enum Written {
 pub struct Files(Pending<ToWrite, Result<Written, JobError>>);
 
 impl Files {
-    /// No file yet. `wake` is called when one is written.
-    pub fn new(wake: Wake) -> Self {
-        Self(Pending::new("file", wake))
+    /// No file yet.
+    pub fn new(jobs: Jobs) -> Self {
+        Self(Pending::new("file", jobs))
     }
 
     /// Writes a file, which must not be one of the files `used`.
@@ -187,9 +186,9 @@ pub struct Dialogs {
 }
 
 impl Dialogs {
-    /// No dialog yet. `wake` is called when one is answered.
-    pub fn new(desktop: Desktop, wake: Wake) -> Self {
-        let asked = Pending::new("file dialog", wake);
+    /// No dialog yet.
+    pub fn new(desktop: Desktop, jobs: Jobs) -> Self {
+        let asked = Pending::new("file dialog", jobs);
         Self { desktop, asked }
     }
 
@@ -317,9 +316,6 @@ pub fn open(files: Vec<PathBuf>) -> Result<(), OpenError> {
     }
 }
 
-/// Why no file is opened now.
-const BUSY: &str = "A training is running: stop it before you open other files.";
-
 impl DecouplerWindow {
     /// Gives files dropped on the window to the view that takes them, and shows it.
     pub(super) fn take_dropped(&mut self, ctx: &Context) {
@@ -333,10 +329,9 @@ impl DecouplerWindow {
         if paths.is_empty() {
             return;
         }
-        if self.shared.phase.is_busy() {
-            self.notices.fail(Matter::Recording, BUSY);
-        } else {
-            self.views.open_files(paths);
+        match Command::OpenFiles.obstacle(&self.shared) {
+            Some(obstacle) => self.notices.fail(Matter::Recording, obstacle),
+            None => self.views.open_files(paths),
         }
         self.show(ViewKind::Train);
         ctx.request_repaint();
@@ -359,18 +354,18 @@ impl DecouplerWindow {
         );
         painter.rect(whole, radius(), fill, stroke, StrokeKind::Inside);
         let font = FontId::proportional(type_size().title);
-        let text = if self.shared.phase.is_busy() {
-            BUSY
-        } else {
-            "Drop to open, or to add to the recording"
-        };
+        let text = Command::OpenFiles.obstacle(&self.shared);
+        let text = text.unwrap_or("Drop to open, or to add to the recording");
         painter.text(whole.center(), Align2::CENTER_CENTER, text, font, palette.text);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::{fs, sync::mpsc::channel};
+    use std::{
+        fs,
+        sync::{Arc, mpsc::channel},
+    };
 
     use decoupler_files::export::{WriteError, atomic_write};
 
@@ -386,7 +381,7 @@ mod tests {
     #[test]
     fn every_file_is_reported_even_if_writing_it_panicked() {
         let (woke, wakes) = channel();
-        let mut files = Files::new(Arc::new(move || woke.send(()).unwrap_or(())));
+        let mut files = Files::new(Jobs::new(Arc::new(move || woke.send(()).unwrap_or(()))));
         let folder = tempfile::tempdir().unwrap();
         let [whole, broken, missing] = ["whole", "broken", "none/missing"].map(|name| folder.path().join(name));
         let message = "it is there".to_owned();
@@ -430,7 +425,7 @@ mod tests {
     #[test]
     fn another_file_is_replaced_only_after_asking() {
         let (woke, wakes) = channel();
-        let mut files = Files::new(Arc::new(move || woke.send(()).unwrap_or(())));
+        let mut files = Files::new(Jobs::new(Arc::new(move || woke.send(()).unwrap_or(()))));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("table");
         fs::write(&path, "mine").unwrap();
@@ -463,7 +458,7 @@ mod tests {
         let (gate, opened) = channel::<()>();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("slow");
-        let mut files = Files::new(Arc::new(|| ()));
+        let mut files = Files::new(Jobs::new(Arc::new(|| ())));
         let to_write = ToWrite {
             task: FileTask::save(WORDS, "slow", |_| Err("unused")),
             path: path.clone(),

@@ -55,11 +55,12 @@ pub(super) enum Reply {
 
 impl DecouplerWindow {
     /// Shows the modal, and does what the user answers.
-    pub(super) fn modal_ui(&mut self, ui: &mut Ui, offers: &[Offer]) {
+    pub(super) fn modal_ui(&mut self, ui: &mut Ui) {
         let unfinished = match self.modal {
             Some(Modal::Closing(_)) => self.unfinished(),
             _ => Vec::new(),
         };
+        let offers = &self.shared.offers;
         let reply = match &mut self.modal {
             None => return,
             Some(Modal::Palette(palette)) => palette_ui(ui, palette, offers),
@@ -124,20 +125,21 @@ struct Line {
     /// Its accessible name.
     label: String,
     hint: &'static str,
-    /// The answer, unless its command is not available now.
-    reply: Option<Reply>,
+    /// The answer, or the reason why its command is not available now.
+    reply: Result<Reply, String>,
 }
 
 impl Line {
     fn ui(&self, ui: &mut Ui, is_marked: bool) -> Response {
         let right = RichText::new(&self.right).color(Theme::of(ui).palette.dim);
         let size = vec2(ui.available_width(), space(7));
-        let is_possible = self.reply.is_some();
+        let is_possible = self.reply.is_ok();
         let line = ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
             let button = Button::selectable(is_marked, &self.name);
             ui.add_enabled(is_possible, button.min_size(size).right_text(right))
         });
-        let line = line.inner.on_disabled_hover_text("Not available now");
+        let why_not = self.reply.as_ref().err().map_or("", String::as_str);
+        let line = line.inner.on_disabled_hover_text(why_not);
         line.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &self.label));
         hinted(line, self.hint)
     }
@@ -146,7 +148,7 @@ impl Line {
 fn palette_ui(ui: &Ui, palette: &mut Palette, offers: &[Offer]) -> Option<Reply> {
     card_ui(ui, "palette", space(110), |ui| {
         let mut reply = None;
-        let mut lines = matching(ui, offers, &palette.typed);
+        let lines = matching(ui, offers, &palette.typed);
         // Before the field, which would otherwise handle arrows and Enter.
         let [down, up, enter] = [Key::ArrowDown, Key::ArrowUp, Key::Enter]
             .map(|key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key)));
@@ -163,19 +165,19 @@ fn palette_ui(ui: &Ui, palette: &mut Palette, offers: &[Offer]) -> Option<Reply>
             palette.marked = 0;
         }
         ui.add_space(space(2));
+        if lines.is_empty() {
+            dim_ui(ui, "No matches");
+        }
         ScrollArea::vertical().max_height(space(90)).show(ui, |ui| {
-            for (place, line) in lines.iter_mut().enumerate() {
+            for (place, line) in lines.into_iter().enumerate() {
                 let is_marked = place == palette.marked;
                 let shown = line.ui(ui, is_marked);
                 if is_marked && (down || up) {
                     shown.scroll_to_me(None);
                 }
                 if shown.clicked() || (is_marked && enter) {
-                    reply = line.reply.take();
+                    reply = line.reply.ok();
                 }
-            }
-            if lines.is_empty() {
-                dim_ui(ui, "No matches");
             }
         });
         reply
@@ -187,12 +189,7 @@ fn palette_ui(ui: &Ui, palette: &mut Palette, offers: &[Offer]) -> Option<Reply>
 fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
     let has_words = |text: &str| glossary::has_words(text, typed);
     let mut found = Vec::new();
-    for Offer {
-        command,
-        is_possible,
-        of,
-    } in offers
-    {
+    for Offer { command, obstacle, of } in offers {
         let About { name, keys, hint } = command.about();
         let is_named = has_words(&name);
         if is_named || has_words(&format!("{name} {hint}")) {
@@ -205,9 +202,9 @@ fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
                     (None, keys) => keys.map_or(String::new(), |keys| ui.ctx().format_shortcut(&keys)),
                 },
                 hint,
-                reply: is_possible.then(|| Reply::Do(command.clone(), *of)),
+                reply: obstacle.clone().map_or(Ok(Reply::Do(command.clone(), *of)), Err),
             };
-            found.push(((!is_possible, !is_named, of.is_some()), line));
+            found.push(((obstacle.is_some(), !is_named, of.is_some()), line));
         }
     }
     found.sort_by_key(|(rank, _)| *rank);
@@ -218,7 +215,7 @@ fn matching(ui: &Ui, offers: &[Offer], typed: &str) -> Vec<Line> {
         right: "Glossary".to_owned(),
         label: format!("{} in the glossary", term.name),
         hint: term.hint,
-        reply: Some(Reply::Define(term.name)),
+        reply: Ok(Reply::Define(term.name)),
     });
     found.into_iter().map(|(_, line)| line).chain(terms).collect()
 }
@@ -232,15 +229,15 @@ mod tests {
     #[test]
     fn words_in_any_order_find_a_command_and_available_ones_come_first() {
         let of = None;
-        let offer = |command, is_possible| Offer {
+        let offer = |command, obstacle: Option<&str>| Offer {
             command,
-            is_possible,
+            obstacle: obstacle.map(str::to_owned),
             of,
         };
         let offers = [
-            offer(Command::StopTraining, false),
-            offer(Command::Train, true),
-            offer(Command::Show(ViewKind::Compare), true),
+            offer(Command::StopTraining, Some("No training is running.")),
+            offer(Command::Train, None),
+            offer(Command::Show(ViewKind::Compare), None),
         ];
         let names = |typed| {
             let mut names = Vec::new();

@@ -88,7 +88,9 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     driver.click_button("Latest");
 
     driver.details();
-    panics(&mut driver, "decoders", |driver| driver.click("More decoders"));
+    panics(&mut driver, "comparison of decoders", |driver| {
+        driver.click("More decoders");
+    });
     driver.click("More decoders");
     driver.click("More decoders");
     driver.wait("a decoder", |driver| !driver.says("internal error"));
@@ -130,7 +132,7 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
     driver.train();
     driver.wait_for_kept_run();
 
-    panics(&mut driver, "identifiability", |driver| {
+    panics(&mut driver, "identifiability analysis", |driver| {
         driver.click_button("Sensor");
     });
     driver.enter("Height", "8");
@@ -154,7 +156,7 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
     });
 
     driver.click_button("Live");
-    panics(&mut driver, "live", |driver| driver.click("▶ Start"));
+    panics(&mut driver, "live decoding", |driver| driver.click("▶ Start"));
     panics(&mut driver, "network file", |driver| {
         driver.click("Play the sample recording");
     });
@@ -173,7 +175,7 @@ fn jobs_of_a_recording_can_be_started_again_after_a_panic() {
         driver.window_mut().views.open_files(vec![path.clone()]);
         driver.harness().step();
     };
-    panics(&mut driver, "recording", open);
+    panics(&mut driver, "reading of a recording", open);
     open(&mut driver);
     driver.wait("the samples", |driver| driver.says("Test: "));
     driver.click_button("Study");

@@ -18,7 +18,7 @@ use serde_json::{Map, Value, json};
 
 use super::DecouplerWindow;
 use crate::window::{
-    job::{Background, JobError, Wake},
+    job::{Background, JobError, Jobs},
     shared::{Matter, OpenPlan, SourceKind},
 };
 
@@ -167,13 +167,13 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    pub(super) fn new(file: WindowFile, wake: Wake) -> Self {
+    pub(super) fn new(file: WindowFile, jobs: &Jobs) -> Self {
         let WindowFile { path, remembered, .. } = file;
         Self {
             path,
             written: remembered.clone(),
             latest: remembered,
-            job: Background::prompt("memory", wake),
+            job: Background::prompt("memory", jobs),
             has_reported: false,
         }
     }

@@ -12,7 +12,7 @@ use eframe::egui::Context;
 
 use super::{DecouplerWindow, Desktop};
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Matter, Notice, Phase, saying_saved},
+    shared::{Command, Effect, FileTask, FileWords, Matter, Notice, Phase, saying_saved},
     training_worker::Worker,
 };
 use decoupler_files::export::NetworkFile;
@@ -46,7 +46,7 @@ impl Opened {
             small.training.stopping.epochs,
         ) = (3, 40, 5);
         window.apply(Effect::Configure(Box::new(small)));
-        window.apply(Effect::Train);
+        window.apply(Effect::Do(Command::Train));
         window.wait(|window| matches!(window.shared.phase, Phase::Ended(_)));
         window
     }
@@ -103,7 +103,7 @@ fn save_task(window: &DecouplerWindow) -> FileTask {
 fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
     let mut window = Opened::trained();
     let ended = window.shared.phase;
-    window.worker = Worker::dying(Arc::clone(&window.wake));
+    window.worker = Worker::dying(&window.jobs);
     window.wait(|window| window.notice().is_some());
     let Some(Notice::Failed(reason)) = window.notice() else {
         panic!("{:?}", window.notice())
@@ -125,18 +125,18 @@ fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
         "the new worker has nothing to report the old one"
     );
     window.apply(Effect::Settle(Matter::File));
-    window.apply(Effect::Continue);
+    window.apply(Effect::Do(Command::TrainLonger));
     window.wait(|window| window.notice().is_some());
     assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
     assert_eq!(window.shared.phase, ended);
-    window.apply(Effect::Train);
+    window.apply(Effect::Do(Command::Train));
     window.wait(|window| matches!(window.shared.phase, Phase::Ended(_)));
 }
 
 #[test]
 fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
     let mut window = Opened::new();
-    window.worker = Worker::dying(Arc::clone(&window.wake));
+    window.worker = Worker::dying(&window.jobs);
     window.wait(|window| {
         window
             .shared
@@ -155,7 +155,7 @@ fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
     let mut impossible = shown;
     impossible.training.stopping.goal_mse = f64::NAN;
     window.apply(Effect::Configure(Box::new(impossible)));
-    window.apply(Effect::Train);
+    window.apply(Effect::Do(Command::Train));
     window.wait(|window| window.notice().is_some());
     assert!(matches!(window.notice(), Some(Notice::Failed(_))));
     assert_eq!(window.shared.phase, ended, "the current training has ended in this way");
@@ -182,7 +182,7 @@ fn a_file_asked_for_before_another_training_began_is_refused_not_written_about_t
     let mut other = window.shared.draft;
     other.hidden = 4;
     window.apply(Effect::Configure(Box::new(other)));
-    window.apply(Effect::Train);
+    window.apply(Effect::Do(Command::Train));
     window.wait(|window| {
         matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings().hidden == 4
     });
@@ -204,7 +204,7 @@ fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
     impossible.training.stopping.goal_mse = f64::NAN;
     window.apply(Effect::Configure(Box::new(impossible)));
     // Before the new test set is there.
-    window.apply(Effect::Train);
+    window.apply(Effect::Do(Command::Train));
     window.wait(|window| window.notice().is_some());
     window.wait(|window| {
         window

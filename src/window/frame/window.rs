@@ -11,10 +11,10 @@ use super::{
     modal::Modal,
     notices::Notices,
     remembered::{Memory, Remembered, WindowFile},
-    top_bar::{SMALL, top_bar_ui},
+    top_bar::top_bar_ui,
 };
 use crate::window::{
-    job::{Background, Wake},
+    job::{Background, Jobs, Wake},
     preview::PreviewEvent,
     shared::{Command, Effect, Matter, Notice, RunView, RunsRequest, RunsWorker, Shared, ViewKind, training_status},
     theme::{self, Theme, space},
@@ -53,7 +53,7 @@ pub struct DecouplerWindow {
     pub(super) chosen: Remembered,
     /// The file that keeps what is restored at the next start, if there is one.
     pub(super) memory: Option<Memory>,
-    pub(super) wake: Wake,
+    pub(super) jobs: Jobs,
     pub(super) ctx: Context,
     /// Files that the window was opened with.
     pub(super) given: Vec<PathBuf>,
@@ -81,7 +81,8 @@ impl DecouplerWindow {
         // Our own shortcuts keep to sizes at which everything fits.
         ctx.options_mut(|options| options.zoom_with_keyboard = false);
         let mut shared = Shared::new(is_dark);
-        let mut views = Views::new(&wake);
+        let jobs = Jobs::new(wake);
+        let mut views = Views::new(&jobs);
         shared.look.colours = remembered.colours.unwrap_or(shared.look.colours);
         shared.draft = remembered.draft.unwrap_or(shared.draft);
         if let Some(settings) = remembered.recording {
@@ -105,19 +106,19 @@ impl DecouplerWindow {
             notices: Notices::default(),
             modal: None,
             opened: None,
-            worker: Worker::start(Arc::clone(&wake)),
+            worker: Worker::start(&jobs),
             keeping: None,
-            previews: Background::new("preview", Arc::clone(&wake)),
-            runs: RunsWorker::start(Arc::clone(&wake)),
-            opening: Background::new("opened run", Arc::clone(&wake)),
-            files: Files::new(Arc::clone(&wake)),
-            pictures: Background::prompt("picture", Arc::clone(&wake)),
-            dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
+            previews: Background::new("preview", &jobs),
+            runs: RunsWorker::start(&jobs),
+            opening: Background::new("opened run", &jobs),
+            files: Files::new(jobs.clone()),
+            pictures: Background::prompt("picture", &jobs),
+            dialogs: Dialogs::new(desktop, jobs.clone()),
             picked: None,
             undoer: DraftsUndoer::default(),
-            memory: file.map(|file| Memory::new(file, Arc::clone(&wake))),
+            memory: file.map(|file| Memory::new(file, &jobs)),
             chosen: remembered,
-            wake,
+            jobs,
             ctx: ctx.clone(),
             given: Vec::new(),
             is_new: true,
@@ -187,7 +188,7 @@ impl DecouplerWindow {
             self.fit_the_screen();
         }
         let mut effects = Vec::new();
-        let offers = self.take_commands(ui.ctx(), &mut effects);
+        self.take_commands(ui.ctx(), &mut effects);
         self.take_dropped(ui.ctx());
         let (kind, shared) = (self.shared.shown, &self.shared);
         let view = self.views.get(kind);
@@ -206,14 +207,14 @@ impl DecouplerWindow {
             top: 4,
             bottom: 4,
         };
-        let top_bar = Panel::top("top bar")
+        Panel::top("top bar")
             .exact_size(space(11))
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
-                top_bar_ui(ui, kind, &offers, |ui| {
-                    view.tools_ui(ui, shared, &mut effects);
-                    export_menu_ui(ui, || view.shown(shared), &mut effects);
-                })
+                top_bar_ui(ui, shared, &mut effects, |ui, effects| {
+                    view.tools_ui(ui, shared, effects);
+                    export_menu_ui(ui, || view.shown(shared), effects);
+                });
             });
         let status_line = Panel::bottom("status line")
             .exact_size(space(7))
@@ -221,7 +222,7 @@ impl DecouplerWindow {
             .show(ui, |ui| ui.max_rect());
         // A narrow window does not change the width in a wide one.
         let is_narrow = ui.available_width() < 1400.0;
-        let shows_form = self.shows_form || ui.available_width() >= SMALL;
+        let shows_form = self.shows_form || shared.obstacle(&Command::Form).is_some();
         let form = shows_form.then(|| {
             Panel::left(if is_narrow { "narrow form" } else { "form" })
                 .default_size(self.chosen.form_points.unwrap_or(space(68)))
@@ -264,12 +265,9 @@ impl DecouplerWindow {
         }
         self.notices_ui(ui, middle.response.rect);
         self.apply_all(effects);
-        if let Some(command) = top_bar.inner {
-            self.carry_out(&command);
-        }
         self.undoer
             .feed_state(ui.input(|input| input.time), &drafts(&self.shared));
-        self.modal_ui(ui, &offers);
+        self.modal_ui(ui);
         self.dropping_ui(ui);
         self.remember();
         // Work begun in this frame must be finished too.
@@ -310,6 +308,13 @@ pub(super) fn changes_something(ctx: &Context) -> bool {
         };
         input.events.iter().any(is_change)
     })
+}
+
+impl Drop for DecouplerWindow {
+    /// Asks all jobs to end, before each is waited for.
+    fn drop(&mut self) {
+        self.jobs.cancel_all();
+    }
 }
 
 impl eframe::App for DecouplerWindow {

@@ -1,4 +1,5 @@
-//! Background work: [`Background`] work runs one task at a time on a named thread; a newer task replaces an older one.
+//! Background work: [`Background`] work runs one task at a time on a named thread; a newer task replaces an older one. [`Jobs`]
+//! lists those that run, by name.
 //!
 //! A task sends events through a [`Report`], which wakes the window; the window receives them with [`Background::next_event`].
 //! Every task has its own mailbox, so events of an older task are never seen.
@@ -38,10 +39,53 @@ pub enum JobError {
     NoThread(String),
 }
 
+/// The jobs of the window that run now. Each is listed by its name; its events have a type of their own and go to the part of the
+/// window that started it, as one list of them all would hold values whose type is known only when they are taken out.
+#[derive(Clone)]
+pub struct Jobs {
+    /// Called after each event.
+    wake: Wake,
+    running: Arc<Mutex<Vec<Arc<Running>>>>,
+}
+
+/// A job that runs.
+#[derive(Default)]
+struct Running {
+    name: &'static str,
+    is_cancelled: AtomicBool,
+    /// True while it waits for requests, a file or the user.
+    is_waiting: AtomicBool,
+}
+
+impl Jobs {
+    /// None yet. `wake` is called after each event of a job.
+    pub(super) fn new(wake: Wake) -> Self {
+        let running = Arc::default();
+        Self { wake, running }
+    }
+
+    /// Asks all jobs to end.
+    pub(super) fn cancel_all(&self) {
+        let cancel = |job: &Arc<Running>| job.is_cancelled.store(true, Ordering::Relaxed);
+        self.running().iter().for_each(cancel);
+    }
+
+    /// Returns the name of a job that computes, other than `name`.
+    fn computing(&self, name: &str) -> Option<&'static str> {
+        let computes = |job: &&Arc<Running>| job.name != name && !job.is_waiting.load(Ordering::Relaxed);
+        self.running().iter().find(computes).map(|job| job.name)
+    }
+
+    fn running(&self) -> MutexGuard<'_, Vec<Arc<Running>>> {
+        // A panic elsewhere cannot leave the list in an invalid state.
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// Background work, one task at a time. Dropping it cancels the task and waits briefly for its end.
 pub(super) struct Background<E> {
     name: &'static str,
-    wake: Wake,
+    jobs: Jobs,
     /// True for long computations, which run at lower priority than the window.
     yields: bool,
     /// Events of the newest task.
@@ -51,12 +95,12 @@ pub(super) struct Background<E> {
 }
 
 impl<E: Send + 'static> Background<E> {
-    /// Creates a job without work. `name` is the name of its threads; `wake` is called after each event. The work runs at lower
-    /// priority than the window.
-    pub(super) fn new(name: &'static str, wake: Wake) -> Self {
+    /// Creates a job without work, which is listed among `jobs` by the name of its threads. The work runs at lower priority than
+    /// the window.
+    pub(super) fn new(name: &'static str, jobs: &Jobs) -> Self {
         Self {
             name,
-            wake,
+            jobs: jobs.clone(),
             yields: true,
             newest: None,
             thread: None,
@@ -65,8 +109,8 @@ impl<E: Send + 'static> Background<E> {
     }
 
     /// As [`Self::new`], at normal priority: for work that the user is waiting for.
-    pub(super) fn prompt(name: &'static str, wake: Wake) -> Self {
-        let mut job = Self::new(name, wake);
+    pub(super) fn prompt(name: &'static str, jobs: &Jobs) -> Self {
+        let mut job = Self::new(name, jobs);
         job.yields = false;
         job
     }
@@ -82,11 +126,24 @@ impl<E: Send + 'static> Background<E> {
     ) {
         self.cancel();
         let (name, yields) = (self.name, self.yields);
-        let mailbox = Arc::new(Mailbox::new());
+        let running = Arc::new(Running {
+            name,
+            ..Running::default()
+        });
+        self.jobs.running().push(Arc::clone(&running));
+        let mailbox = Arc::new(Mailbox {
+            running,
+            inside: Mutex::new(Inside {
+                events: VecDeque::new(),
+                has_progress: false,
+                has_ended: false,
+            }),
+            ended: Condvar::new(),
+        });
         let before = self.newest.replace(Arc::clone(&mailbox));
         let report = || Report {
             mailbox: Arc::clone(&mailbox),
-            wake: Arc::clone(&self.wake),
+            jobs: self.jobs.clone(),
         };
         let [in_work, at_end] = [report(), report()];
         #[cfg(test)]
@@ -123,8 +180,13 @@ impl<E> Background<E> {
     /// Asks the work to end. Its remaining events are received.
     pub(super) fn cancel(&self) {
         if let Some(mailbox) = &self.newest {
-            mailbox.is_cancelled.store(true, Ordering::Relaxed);
+            mailbox.running.is_cancelled.store(true, Ordering::Relaxed);
         }
+    }
+
+    /// Returns the name of another job that computes now, which would distort times.
+    pub(super) fn distorted_by(&self) -> Option<&'static str> {
+        self.jobs.computing(self.name)
     }
 
     /// Asks the work to end. Its remaining events are discarded.
@@ -215,7 +277,7 @@ pub(in crate::window) type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// Channel between a task and the window: events to the window, cancellation to the task.
 struct Mailbox<E> {
-    is_cancelled: AtomicBool,
+    running: Arc<Running>,
     inside: Mutex<Inside<E>>,
     ended: Condvar,
 }
@@ -228,18 +290,6 @@ struct Inside<E> {
 }
 
 impl<E> Mailbox<E> {
-    fn new() -> Self {
-        Self {
-            is_cancelled: AtomicBool::new(false),
-            inside: Mutex::new(Inside {
-                events: VecDeque::new(),
-                has_progress: false,
-                has_ended: false,
-            }),
-            ended: Condvar::new(),
-        }
-    }
-
     fn inside(&self) -> MutexGuard<'_, Inside<E>> {
         // A panic elsewhere cannot leave the queue in an invalid state.
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
@@ -257,13 +307,27 @@ impl<E> Mailbox<E> {
 /// Sending end of the mailbox, used by the work.
 pub(in crate::window) struct Report<E> {
     mailbox: Arc<Mailbox<E>>,
-    wake: Wake,
+    jobs: Jobs,
 }
 
 impl<E> Report<E> {
     /// Returns true if the work should end.
     pub(in crate::window) fn is_cancelled(&self) -> bool {
-        self.mailbox.is_cancelled.load(Ordering::Relaxed)
+        self.mailbox.running.is_cancelled.load(Ordering::Relaxed)
+    }
+
+    /// Waits for requests, a file or the user with `wait`; meanwhile the work does not compute.
+    pub(in crate::window) fn waiting<T>(&self, wait: impl FnOnce() -> T) -> T {
+        let is_waiting = &self.mailbox.running.is_waiting;
+        is_waiting.store(true, Ordering::Relaxed);
+        let waited = wait();
+        is_waiting.store(false, Ordering::Relaxed);
+        waited
+    }
+
+    /// Returns true while another job computes, which would distort times.
+    pub(in crate::window) fn is_distorted(&self) -> bool {
+        self.jobs.computing(self.mailbox.running.name).is_some()
     }
 
     /// Returns the result of the work, without the error with which cancelled work ends.
@@ -295,6 +359,8 @@ impl<E> Report<E> {
 
     /// Sends the last event.
     fn end(&self, event: E) {
+        let running = &self.mailbox.running;
+        self.jobs.running().retain(|job| !Arc::ptr_eq(job, running));
         self.put(|inside| {
             inside.events.push_back(event);
             inside.has_ended = true;
@@ -304,7 +370,7 @@ impl<E> Report<E> {
 
     fn put(&self, change: impl FnOnce(&mut Inside<E>)) {
         change(&mut self.mailbox.inside());
-        (self.wake)();
+        (self.jobs.wake)();
     }
 }
 

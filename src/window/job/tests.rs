@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use super::{Background, JobError, Report};
+use super::{Background, JobError, Jobs, Report};
 
 /// Timeout, far longer than any test takes.
 const LONG: Duration = Duration::from_secs(600);
@@ -21,7 +21,7 @@ enum Event {
 }
 
 fn job() -> Background<Event> {
-    Background::new("test", Arc::new(|| ()))
+    Background::new("test", &Jobs::new(Arc::new(|| ())))
 }
 
 /// Waits for the end and returns all events.
@@ -138,7 +138,7 @@ fn unreceived_progress_is_replaced_and_its_data_is_kept() {
 fn received_progress_is_not_added_again() {
     let (woke, wakes) = channel();
     let (go_on, may_go_on) = channel();
-    let mut job = Background::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
+    let mut job = Background::new("test", &Jobs::new(Arc::new(move || woke.send(()).unwrap_or(()))));
     job.start(
         move |report| {
             for step in 1..=3 {
@@ -165,7 +165,7 @@ fn a_panic_is_reported_with_its_message_and_the_window_is_woken() {
         }))
     };
     let (woke, wakes) = channel();
-    let mut job = Background::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
+    let mut job = Background::new("test", &Jobs::new(Arc::new(move || woke.send(()).unwrap_or(()))));
     job.start(|_| panic!("a plain reason"), Event::Ended);
     wakes.recv_timeout(LONG).unwrap();
     assert_eq!(all_of(&mut job), [expected("a plain reason")]);
@@ -226,4 +226,41 @@ fn dropping_does_not_wait_forever() {
     has_begun.recv().unwrap();
     drop(job);
     gate.send(()).expect("the work is still waiting");
+}
+
+#[test]
+fn one_list_knows_which_jobs_compute_and_cancels_them_all() {
+    let jobs = Jobs::new(Arc::new(|| ()));
+    let [mut one, mut other] = ["one", "other"].map(|name| Background::new(name, &jobs));
+    assert_eq!(one.distorted_by(), None);
+    let (work, has_begun, gate) = gated("before", "after");
+    one.start(work, Event::Ended);
+    has_begun.recv_timeout(LONG).unwrap();
+    assert_eq!((one.distorted_by(), other.distorted_by()), (None, Some("one")));
+    gate.send(()).unwrap();
+    one.wait(LONG);
+    assert_eq!(other.distorted_by(), None, "it has ended");
+
+    let (begun, has_begun) = channel();
+    let (gate, opened) = channel::<()>();
+    let waits = move |report: &Report<Event>| {
+        report.waiting(|| {
+            begun.send(()).unwrap();
+            opened.recv().unwrap();
+        });
+        begun.send(()).unwrap();
+        spin_until_cancelled(report);
+    };
+    one.start(waits, Event::Ended);
+    has_begun.recv_timeout(LONG).unwrap();
+    assert_eq!(other.distorted_by(), None, "it waits");
+    gate.send(()).unwrap();
+    has_begun.recv_timeout(LONG).unwrap();
+    other.start(spin_until_cancelled, Event::Ended);
+    assert_eq!((one.distorted_by(), other.distorted_by()), (Some("other"), Some("one")));
+    jobs.cancel_all();
+    for job in [&mut one, &mut other] {
+        assert_eq!(all_of(job), [Event::Ended(Ok(()))]);
+        assert_eq!(job.distorted_by(), None);
+    }
 }

@@ -106,16 +106,16 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
     };
     let is_square = matches!(&figure.plots[..], [plot] if plot.has_equal_scales);
     let left_by_square = ui.available_width() - ui.available_height() - 2.0 * space(3);
-    let are_notes_beside = is_square && left_by_square >= NOTES_WIDTH;
+    let are_notes_right = is_square && left_by_square >= NOTES_WIDTH;
     // A low card is for the curves; their names are under the pointer.
     let low = if is_square { space(64) } else { space(30) };
-    if !are_notes_beside && ui.available_height() >= low {
+    if !are_notes_right && ui.available_height() >= low {
         head_ui(ui);
     }
     let whole = ui.available_rect_before_wrap();
     let count = figure.plots.len().max(1) as f32;
     let mut width = (whole.width() - (count - 1.0) * space(3)) / count;
-    if are_notes_beside {
+    if are_notes_right {
         width = (width - NOTES_WIDTH).min(MAX_ASPECT * whole.height());
     } else if is_square {
         // Apart from the numbers at the axes.
@@ -147,9 +147,9 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
         if figure.is_stacked {
             let place = slot.with_max_x(slot.left() + names).shrink2(Vec2::new(0.0, space(2)));
             let name = Label::new(RichText::new(&plot.y.name).size(type_size().note)).wrap();
-            let mut beside = ui.new_child(UiBuilder::new().max_rect(place));
-            beside.set_clip_rect(place);
-            beside.add(name);
+            let mut name_ui = ui.new_child(UiBuilder::new().max_rect(place));
+            name_ui.set_clip_rect(place);
+            name_ui.add(name);
             slot.min.x += names;
         }
         let track = figure.is_stacked.then_some(is_last);
@@ -168,7 +168,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
         drawn
     });
     let plots = plots.collect();
-    if are_notes_beside {
+    if are_notes_right {
         let place = whole.with_min_x(slot(1).left()).with_min_y(whole.top() + space(4));
         head_ui(&mut ui.new_child(UiBuilder::new().max_rect(place)));
     }

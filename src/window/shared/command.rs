@@ -1,18 +1,19 @@
 //! Everything that the user can do by a key or by name.
 
 use decoupler_files::figure::SequentialMap;
-use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
+use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers, Ui, Widget, WidgetInfo, accesskit::Role};
 
-use super::ViewKind;
+use super::{Effect, Phase, Shared, ViewKind};
+use crate::window::widgets::neighbours;
 
 /// Something that the user can do by a key, or by picking it from the list of all commands.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "`about` has the name and the explanation of each")]
 pub enum Command {
     // Of the Train view.
     Train,
     TrainLonger,
     PauseTraining,
-    ResumeTraining,
     StopTraining,
     OpenFiles,
     DecodeFile,
@@ -22,12 +23,10 @@ pub enum Command {
     Chart(&'static str),
     NextSection,
     PreviousSection,
-    SectionAlongColumns,
-    SectionAlongRows,
+    TurnSection,
     // Of other views, which name their work: "Run experiment".
     Begin(&'static str),
     Cancel(&'static str),
-    CrossValidate,
     Record,
     ReZero,
     PlayReplay,
@@ -77,28 +76,21 @@ impl Command {
                 None,
                 "Continue from the current weights with the method and the epochs on the left, counted from here.",
             ),
-            Self::PauseTraining => ("Pause training", ctrl(Key::P), ""),
-            Self::ResumeTraining => ("Resume training", ctrl(Key::P), ""),
+            Self::PauseTraining => ("Pause or resume training", ctrl(Key::P), ""),
             Self::StopTraining => ("Stop training", ctrl(Key::Period), "End it and keep the best network."),
             Self::OpenFiles => ("Open files", None, "A recording, recipe, network or checkpoint."),
-            Self::DecodeFile => (
-                "Decode file",
-                None,
-                "All rows of another file, with the network, to CSV.",
-            ),
+            Self::DecodeFile => ("Decode file", None, "Decodes all samples of another file, to CSV."),
             Self::PressMiddle => ("Press the middle of the surface", None, "Touch the sensor."),
             Self::NextSample => ("Next test sample", plain(Key::PageDown), ""),
             Self::PreviousSample => ("Previous test sample", plain(Key::PageUp), ""),
             Self::Chart(name) => (*name, None, "Show this chart."),
             Self::NextSection => ("Next section", plain(Key::CloseBracket), ""),
             Self::PreviousSection => ("Previous section", plain(Key::OpenBracket), ""),
-            Self::SectionAlongColumns => ("Section along a column-wire", plain(Key::Backslash), ""),
-            Self::SectionAlongRows => ("Section along a row-wire", plain(Key::Backslash), ""),
+            Self::TurnSection => ("Section along the other wire", plain(Key::Backslash), ""),
             Self::Begin(name) => (*name, ctrl(Key::Enter), "Start."),
             Self::Cancel(name) => (*name, ctrl(Key::Period), "Stop; what has finished is kept."),
-            Self::CrossValidate => ("Cross-validate", None, "Test on every part of the samples."),
             Self::Record => ("Start or end recording", ctrl(Key::R), "Write each frame to a file."),
-            Self::ReZero => ("Re-zero", None, "Take the present readings as those at rest."),
+            Self::ReZero => ("Re-zero", None, "Take the current readings as those at rest."),
             Self::PlayReplay => ("Pause or resume replay", ctrl(Key::P), ""),
             Self::Export(name) => (name.as_str(), None, ""),
             Self::Undo => ("Undo change of settings", ctrl(Key::Z), ""),
@@ -136,6 +128,29 @@ impl Command {
             hint,
         }
     }
+
+    /// Returns the reason why it is not available now, if the shared state has one. What only a view or the frame knows, such
+    /// as the displayed sample or the size of the window, it adds where it offers the command.
+    pub fn obstacle<'s>(&self, shared: &'s Shared) -> Option<&'s str> {
+        const RUNNING: &str = "A training is running: stop it first.";
+        let phase = shared.phase;
+        let has_trained = || shared.shown_run().is_some_and(|run| run.stop_reason.is_some());
+        let (is_met, obstacle) = match self {
+            Self::Train if !phase.is_busy() => return shared.missing_recording(),
+            Self::Train | Self::OpenFiles | Self::Undo | Self::Redo => (!phase.is_busy(), RUNNING),
+            Self::TrainLonger => (shared.can_continue(), "No training of these samples has ended."),
+            Self::PauseTraining => (
+                matches!(phase, Phase::Training | Phase::Paused),
+                "No training is running.",
+            ),
+            Self::StopTraining => (phase.is_busy(), "No training is running."),
+            Self::DecodeFile => (has_trained(), "Train a network first."),
+            Self::Show(view) => (*view != shared.shown, "It is the current view."),
+            Self::Colours(map) => (*map != shared.look.colours, "They are in use."),
+            _ => return None,
+        };
+        (!is_met).then_some(obstacle)
+    }
 }
 
 impl About {
@@ -153,8 +168,8 @@ impl About {
 pub struct Offer {
     /// The command.
     pub command: Command,
-    /// False if it is not available now.
-    pub is_possible: bool,
+    /// Reason why it is not available now.
+    pub obstacle: Option<String>,
     /// The view that must be shown first, if it is another one.
     pub of: Option<ViewKind>,
 }
@@ -167,23 +182,33 @@ pub struct Offers<'a> {
     pub ctx: &'a Context,
     /// False while a modal is open, which hears the keys.
     pub is_heard: bool,
+    shared: &'a Shared,
     picked: Option<Command>,
     list: Vec<Offer>,
 }
 
 impl<'a> Offers<'a> {
     /// Nothing offered yet; `picked` is the command picked from the list or by a button.
-    pub fn new(ctx: &'a Context, picked: Option<Command>, is_heard: bool) -> Self {
+    pub fn new(ctx: &'a Context, shared: &'a Shared, picked: Option<Command>, is_heard: bool) -> Self {
         Self {
             ctx,
             is_heard,
+            shared,
             picked,
             list: Vec::new(),
         }
     }
 
     /// Offers a command. Returns true if the user invoked it.
-    pub fn offer(&mut self, command: Command, is_possible: bool) -> bool {
+    pub fn offer(&mut self, command: Command) -> bool {
+        self.offer_unless(command, None::<String>)
+    }
+
+    /// As [`Self::offer`], unless the caller has an obstacle that [`Command::obstacle`] cannot know.
+    pub fn offer_unless(&mut self, command: Command, obstacle: Option<impl Into<String>>) -> bool {
+        let of_all = command.obstacle(self.shared).map(str::to_owned);
+        let obstacle = of_all.or_else(|| obstacle.map(Into::into));
+        let is_possible = obstacle.is_none();
         let is_picked = self.picked.take_if(|picked| *picked == command).is_some();
         // Text being typed keeps its own keys.
         let may_hear = |keys: &KeyboardShortcut| {
@@ -193,17 +218,44 @@ impl<'a> Offers<'a> {
         let keys = command.about().keys.filter(may_hear);
         let is_pressed = keys.is_some_and(|keys| self.ctx.input_mut(|input| input.consume_shortcut(&keys)));
         let of = None;
-        self.list.push(Offer {
-            command,
-            is_possible,
-            of,
-        });
+        self.list.push(Offer { command, obstacle, of });
         is_possible && (is_picked || is_pressed)
+    }
+
+    /// Offers the steps to the samples before and after the displayed one. Returns the sample to show.
+    pub fn offer_samples(&mut self, shown: usize, samples: usize) -> Option<usize> {
+        let steps = [Command::PreviousSample, Command::NextSample].into_iter();
+        let steps = steps.zip(neighbours(shown, samples));
+        let asked =
+            steps.filter(|(step, to)| self.offer_unless(step.clone(), to.is_none().then_some("It is the last one.")));
+        asked.last()?.1
     }
 
     /// Returns the commands in the order in which they were offered.
     pub fn into_list(self) -> Vec<Offer> {
         self.list
+    }
+}
+
+/// Shows the button of a command, with its name and its keys under the pointer, or why it is not available now. Its accessible
+/// name is `label`, if the button does not show it.
+pub fn command_button_ui(
+    ui: &mut Ui,
+    shared: &Shared,
+    command: Command,
+    button: impl Widget,
+    label: Option<&str>,
+    effects: &mut Vec<Effect>,
+) {
+    let obstacle = shared.obstacle(&command);
+    let hint = command.about().tooltip(ui.ctx());
+    let button = ui.add_enabled(obstacle.is_none(), button).on_hover_text(&hint);
+    if let Some(label) = label {
+        button.widget_info(|| WidgetInfo::labeled(Role::Button, obstacle.is_none(), label));
+    }
+    let why_not = format!("{hint}\n{}", obstacle.unwrap_or_default());
+    if button.on_disabled_hover_text(why_not).clicked() {
+        effects.push(Effect::Do(command));
     }
 }
 
@@ -229,12 +281,9 @@ mod tests {
         };
         let mut found = None;
         let mut output = ctx.run_ui(input, |ui| {
-            let mut offers = Offers::new(ui.ctx(), picked.clone(), is_heard);
-            let done = [
-                offers.offer(Command::Train, true),
-                offers.offer(Command::StopTraining, false),
-                offers.offer(Command::Dark, true),
-            ];
+            let shared = Shared::new(true);
+            let mut offers = Offers::new(ui.ctx(), &shared, picked.clone(), is_heard);
+            let done = [Command::Train, Command::StopTraining, Command::Dark].map(|command| offers.offer(command));
             found.get_or_insert((offers.into_list(), done));
         });
         // Nothing is drawn.
@@ -257,7 +306,8 @@ mod tests {
         let stop = Some((Modifiers::COMMAND, Key::Period));
         let (offers, done) = frame(Some(Command::StopTraining), stop, true);
         assert_eq!(done, [false; 3]);
-        let is_possible = offers.iter().map(|offer| offer.is_possible);
-        assert_eq!(is_possible.collect::<Vec<_>>(), [true, false, true]);
+        let obstacles = offers.iter().map(|offer| offer.obstacle.as_deref());
+        let obstacles = Vec::from_iter(obstacles);
+        assert_eq!(obstacles, [None, Some("No training is running."), None]);
     }
 }

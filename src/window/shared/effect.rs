@@ -3,7 +3,7 @@ use std::{path::PathBuf, sync::Arc};
 use decoupler_core::{evaluation::RunSettings, training::TrainerState};
 use decoupler_files::import::{Plan, Setup};
 
-use super::{Exporting, FileTask, Look, RunsRequest, SourceKind, ToCopy, ViewKind};
+use super::{Command, Exporting, FileTask, Look, RunsRequest, SourceKind, ToCopy};
 
 /// Request of a view to the window, which applies all of them in one place once everything is drawn.
 #[derive(Clone, Debug)]
@@ -18,26 +18,16 @@ pub enum Effect {
     ChooseSource(SourceKind),
     /// Use the setup of another run for the next training.
     TakeSetup(Box<Setup>),
-    /// Show this view.
-    Show(ViewKind),
+    /// Carry out this command.
+    Do(Command),
     /// Show the run of the list with this number in the Train view, with its settings.
     OpenRun(u64),
-    /// Begin training.
-    Train,
     /// Open the training saved in this checkpoint.
     OpenTraining(PathBuf),
     /// Show the training with this setup and these states of its starts.
     TakeUp(Box<Setup>, Vec<TrainerState>),
-    /// Pause the training.
-    Pause,
-    /// Resume it.
-    Resume,
-    /// Stop it.
-    Stop,
     /// Answer with ridge regression in place of the network of the ended training.
     UseRidge,
-    /// Continue from the current weights with the method and the epochs of the settings.
-    Continue,
     /// Set the look of all surfaces.
     Look(Look),
     /// Ask for the path of a file.

@@ -26,7 +26,7 @@ use decoupler_files::{
         report::RunReport,
     },
     figure::Figure,
-    import::{Recorded, Setup, SetupSets},
+    import::{self, Recorded, Setup, SetupSets},
 };
 
 use super::{Effect, RunView};
@@ -249,19 +249,7 @@ impl Format {
     /// Returns words for its file, or its description for a copy.
     pub fn words(self) -> FileWords {
         let (kind, description, extensions): (_, _, &[_]) = match self {
-            Self::Bundle(format) => (
-                format.title(),
-                match format {
-                    BundleFormat::Onnx => "A folder with an ONNX graph (opset 13) and golden readings.",
-                    BundleFormat::C99 => {
-                        "A folder with one header and one source in C99 and a self-test. fixed16 uses \
-                                          integer arithmetic only, for microcontrollers."
-                    }
-                    BundleFormat::Matlab => "A folder with one function for MATLAB and GNU Octave and golden readings.",
-                    BundleFormat::NumPy => "A folder with the weights, a short decode.py and golden readings.",
-                },
-                &[],
-            ),
+            Self::Bundle(format) => (format.title(), format.meaning(), &[]),
             Self::NetworkFile => (
                 "network",
                 "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal commands decode and \
@@ -656,9 +644,9 @@ impl NetworkSource {
 /// A file of readings for a network.
 const DECODED: FileWords = FileWords {
     kind: "readings",
-    description: "Decodes all rows of another file with the columns of the readings; a CSV file next to it gets the targets, with \
+    description: "Decodes all samples of another file with the columns of the readings; a CSV file next to it gets the targets, with \
                   the times and groups of the file and the half-widths of the 90 % intervals.",
-    extensions: &["csv", "txt", "tsv", "npy", "npz", "mat", "xlsx"],
+    extensions: &import::Format::EXTENSIONS,
 };
 
 /// Decodes the readings in a file into a table next to it, and says where and what to check.

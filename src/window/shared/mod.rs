@@ -13,7 +13,7 @@ mod state;
 mod view;
 
 pub use super::training_worker::{OpenPlan, RunResult, RunView};
-pub use command::{About, Command, Offer, Offers};
+pub use command::{About, Command, Offer, Offers, command_button_ui};
 pub use effect::{Effect, Matter, Notice};
 pub use error_table::{error_table_ui, targets_table_ui};
 pub use export::{

@@ -18,7 +18,7 @@ use std::{
 use decoupler_files::export::{KeptRun, KeptRuns, NetworkFile, RunFolder};
 
 use crate::window::{
-    job::{Background, JobError, Wake, caught},
+    job::{Background, JobError, Jobs, caught},
     shared::Notice,
 };
 
@@ -56,14 +56,14 @@ pub struct RunsWorker {
 type Listed = Result<(RunList, Vec<String>), Option<JobError>>;
 
 impl RunsWorker {
-    /// Starts the thread. `wake` is called after each event.
-    pub fn start(wake: Wake) -> Self {
+    /// Starts the thread.
+    pub fn start(jobs: &Jobs) -> Self {
         let (requests, incoming) = channel();
-        let mut job = Background::new(THREAD, wake);
+        let mut job = Background::new(THREAD, jobs);
         job.start(
             move |report| {
                 let mut folder = RunFolder::default();
-                for request in incoming {
+                while let Ok(request) = report.waiting(|| incoming.recv()) {
                     report.send(Ok(answer(request, &mut folder)));
                 }
             },
@@ -248,7 +248,7 @@ mod tests {
     #[test]
     fn a_request_that_panics_is_reported_and_the_next_is_answered() {
         let (wake, woken) = channel();
-        let worker = RunsWorker::start(Arc::new(move || wake.send(()).unwrap_or(())));
+        let worker = RunsWorker::start(&Jobs::new(Arc::new(move || wake.send(()).unwrap_or(()))));
         let mut list = RunList::default();
         worker.ask(RunsRequest::Keep(Box::new(small_run())));
         // There is no third place.

@@ -2,47 +2,30 @@ use std::time::Duration;
 
 use decoupler_core::{evaluation::TestErrors, text::capitalised, training::StopReason};
 use decoupler_files::export::{format_duration, format_percent};
-use eframe::egui::{Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::Ui;
 
-use super::{Command, Effect, Phase, RunView, Shared, SourceKind, Status, Tone};
+use super::{Command, Effect, Phase, RunView, Shared, SourceKind, Status, Tone, command_button_ui};
 use crate::window::widgets::{ghost_button, primary_button};
 
 /// The buttons that run a training.
 pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-    let phase = shared.phase;
     // In a narrow window the buttons show only their symbols.
     let is_short = ui.ctx().content_rect().width() < 1100.0;
-    let longer = Command::TrainLonger.about();
-    if shared.can_continue() && ui.add(ghost_button(&longer.name)).on_hover_text(longer.hint).clicked() {
-        effects.push(Effect::Continue);
+    let longer = Command::TrainLonger;
+    if shared.obstacle(&longer).is_none() {
+        let button = ghost_button(longer.about().name);
+        command_button_ui(ui, shared, longer, button, None, effects);
     }
-    let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, command: Command, effect: Effect| {
-        let shown = if is_short {
-            text.split(' ').next().unwrap_or(text)
-        } else {
-            text
-        };
-        let button = ui.add_enabled(is_possible, ghost_button(shown));
-        button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, text));
-        if button.on_hover_text(command.about().tooltip(ui.ctx())).clicked() {
-            effects.push(effect);
-        }
-    };
-    let (text, command, effect) = match phase {
-        Phase::Paused => ("▶ Resume", Command::ResumeTraining, Effect::Resume),
-        _ => ("⏸ Pause", Command::PauseTraining, Effect::Pause),
-    };
     // They appear before Train, which stays where it is under the pointer.
-    if phase.is_busy() {
-        let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-        button_ui(ui, text, can_pause, command, effect);
-        button_ui(ui, "■ Stop", true, Command::StopTraining, Effect::Stop);
+    if shared.obstacle(&Command::StopTraining).is_none() {
+        let is_paused = shared.phase == Phase::Paused;
+        let pause = if is_paused { "▶ Resume" } else { "⏸ Pause" };
+        for (command, text) in [(Command::PauseTraining, pause), (Command::StopTraining, "■ Stop")] {
+            let shown = text.split(' ').next().filter(|_| is_short).unwrap_or(text);
+            command_button_ui(ui, shared, command, ghost_button(shown), Some(text), effects);
+        }
     }
-    let train = ui.add_enabled(!phase.is_busy(), primary_button("▶ Train"));
-    let hint = Command::Train.about().tooltip(ui.ctx());
-    if train.on_hover_text(hint).clicked() {
-        effects.push(Effect::Train);
-    }
+    command_button_ui(ui, shared, Command::Train, primary_button("▶ Train"), None, effects);
 }
 
 /// Returns the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of
@@ -76,8 +59,7 @@ fn phase_in_words(shared: &Shared) -> Status {
         phase => phase,
     };
     let (tone, text) = match phase {
-        Phase::Idle if is_recording && shared.recording.plan.is_err() => (Tone::Calm, "Ready: open a recording"),
-        Phase::Idle => (Tone::Calm, "Ready: press Train"),
+        Phase::Idle => (Tone::Calm, shared.missing_recording().unwrap_or("Ready: press Train")),
         Phase::Preparing if is_recording => {
             let preparing = shared.preparing.as_ref().map(|preparing| preparing.text.as_str());
             (Tone::Busy, preparing.unwrap_or("Reading the recording"))

@@ -15,7 +15,7 @@ use decoupler_files::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::{Look, RunList, RunResult, RunView, ViewKind};
+use super::{Command, Look, Offer, RunList, RunResult, RunView, ViewKind};
 use crate::window::{
     test_view::{HeightScale, Skin, TestView},
     training_worker::{Asked, OpenPlan, Preparing},
@@ -44,8 +44,8 @@ pub struct Shared {
     pub look: Look,
     /// The displayed view.
     pub shown: ViewKind,
-    /// The views whose threads compute.
-    pub working: Vec<ViewKind>,
+    /// The commands of this frame.
+    pub offers: Vec<Offer>,
 }
 
 /// Kinds of source.
@@ -149,8 +149,14 @@ impl Shared {
                 error_limit_mm: None,
             },
             shown: ViewKind::default(),
-            working: Vec::new(),
+            offers: Vec::new(),
         }
+    }
+
+    /// Returns the reason why a command is not available in this frame; an empty one if it is not offered.
+    pub fn obstacle(&self, command: &Command) -> Option<&str> {
+        let offer = self.offers.iter().find(|offer| offer.command == *command);
+        offer.map_or(Some(""), |offer| offer.obstacle.as_deref())
     }
 
     /// Returns true if the displayed view has a column on the right in a window of this width in points, which leaves the
@@ -187,6 +193,13 @@ impl Shared {
             SourceKind::Array => self.draft.training = training,
             SourceKind::Recording => self.recording.settings.training = training,
         }
+    }
+
+    /// Returns what the recording that is to be trained on lacks, with what to do.
+    pub fn missing_recording(&self) -> Option<&str> {
+        let is_recording = self.source == SourceKind::Recording;
+        let reason = self.recording.plan.as_ref().err().filter(|_| is_recording);
+        reason.map(String::as_str)
     }
 
     /// Setup of the next training.

@@ -1,6 +1,6 @@
 //! The interface of all views.
 
-use std::fmt::Debug;
+use std::fmt::{Debug, Display};
 
 use eframe::egui::{Align, Key, Label, Layout, RichText, Sense, TextStyle, TextWrapMode, Ui, Vec2, WidgetText};
 
@@ -165,8 +165,6 @@ pub enum Tone {
 /// Work and files of a view.
 #[derive(Debug, Default)]
 pub struct Holdings {
-    /// True while its threads compute.
-    pub is_computing: bool,
     /// Work that closing the window would cut short, or whose result it would discard.
     pub unfinished: Vec<Unfinished>,
     /// Files in use, which must not be overwritten.
@@ -176,15 +174,18 @@ pub struct Holdings {
 /// Work that closing the window would cut short, or whose result it would discard.
 #[derive(Debug)]
 pub struct Unfinished {
-    /// Name that distinguishes the work from other work of the same view: "Training".
-    pub work: &'static str,
+    /// Its view or place, and the name that distinguishes it from other work there: "Train: Training".
+    pub name: String,
     /// Its progress: "epoch 12 of 1000".
     pub progress: String,
 }
 
 impl Unfinished {
-    /// Work with its progress.
-    pub fn new(work: &'static str, progress: String) -> Self {
-        Self { work, progress }
+    /// Work at a place, with its progress.
+    pub fn new(place: &str, work: impl Display, progress: impl Into<String>) -> Self {
+        Self {
+            name: format!("{place}: {work}"),
+            progress: progress.into(),
+        }
     }
 }

@@ -73,7 +73,7 @@ impl Calibration {
             None => {
                 if let Some(time) = Intervals::time(run).filter(|time| *time > Intervals::MAX_TIME) {
                     return Err(format!(
-                        "no 90 % intervals: calibrating them takes about {}; train in a terminal with --intervals always",
+                        "no 90 % intervals: calibrating them takes about {}; fewer hidden nodes or restarts take less",
                         format_duration(time)
                     ));
                 }

@@ -26,7 +26,7 @@ use super::{
     training_loop::TrainingLoop,
 };
 use crate::window::{
-    job::{Background, JobError, Wake},
+    job::{Background, JobError, Jobs},
     test_view::TestCharts,
     timeline::Timeline,
 };
@@ -255,10 +255,10 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread; `wake` is called after each event.
-    pub fn start(wake: Wake) -> Self {
+    /// Starts the thread.
+    pub fn start(jobs: &Jobs) -> Self {
         let (requests, incoming) = channel();
-        let mut job = Background::new("training", wake);
+        let mut job = Background::new("training", jobs);
         let (newest, keeping) = (Arc::<AtomicU64>::default(), Keeping::default());
         let (in_thread, keeps) = (Arc::clone(&newest), keeping.clone());
         job.start(
@@ -277,11 +277,6 @@ impl Worker {
     /// Returns true if the thread has ended.
     pub fn has_died(&self) -> bool {
         !self.job.is_under_way()
-    }
-
-    /// Starts another thread after this one has died.
-    pub fn restart(&mut self, wake: Wake) {
-        *self = Self::start(wake);
     }
 
     /// Removes the checkpoint of the running training, which the user leaves unfinished, and keeps none from now on.
@@ -343,9 +338,9 @@ mod tests {
     use super::*;
 
     impl Worker {
-        /// Returns a worker whose thread panics; `wake` is called afterwards.
-        pub fn dying(wake: Wake) -> Self {
-            let mut dead = Self::start(wake);
+        /// Returns a worker whose thread panics.
+        pub fn dying(jobs: &Jobs) -> Self {
+            let mut dead = Self::start(jobs);
             dead.requests = channel().0;
             dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
             dead

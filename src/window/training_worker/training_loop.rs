@@ -19,7 +19,7 @@ use decoupler_core::{
     training::TrainingSettings,
 };
 use decoupler_files::{
-    export::{CheckpointFile, CheckpointPlace, NetworkFile, describe_samples},
+    export::{CheckpointFile, CheckpointPlace, NetworkFile, describe_samples, format_duration},
     import::{ChoosingProgress, Progress as Reading, Setup, SetupSets},
     machine::system_cause,
 };
@@ -96,7 +96,7 @@ impl<'a> TrainingLoop<'a> {
             let stage = self.current.as_ref().map(|current| current.stage);
             let request = match stage {
                 Some(Stage::Training | Stage::Calibrating) => requests.try_recv(),
-                _ => requests.recv().map_err(TryRecvError::from),
+                _ => self.report.waiting(|| requests.recv()).map_err(TryRecvError::from),
             };
             match request {
                 Ok(request) => self.answer(request),
@@ -228,10 +228,17 @@ impl<'a> TrainingLoop<'a> {
             Origin::New(setup) => draw(&setup, None).map_err(|error| error.to_string())?,
             Origin::States(setup, states) => draw(&setup, Some(states)).map_err(|error| error.to_string())?,
             Origin::Chosen(setup) => {
+                let mut begun = None;
                 let mut on_choosing = |progress| match progress {
                     ChoosingProgress::Reading(progress) => on_reading(progress),
                     ChoosingProgress::Trying(progress) => {
-                        on_work("Choosing settings", progress.text, Some(progress.share as f32));
+                        let (mut text, share) = (progress.text, progress.share);
+                        let elapsed = begun.get_or_insert_with(Instant::now).elapsed();
+                        if share > 0.05 {
+                            let left = elapsed.mul_f64(1.0 / share - 1.0);
+                            text += &format!(", about {} left", format_duration(left));
+                        }
+                        on_work("Choosing settings", text, Some(share as f32));
                     }
                 };
                 let fixed = AutoFixed::default();

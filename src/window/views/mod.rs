@@ -9,10 +9,10 @@ mod sensor;
 mod study;
 mod train;
 
-use std::{path::PathBuf, sync::Arc};
+use std::path::PathBuf;
 
 use super::{
-    job::Wake,
+    job::Jobs,
     shared::{View, ViewKind},
 };
 use decoupler_files::import::Plan;
@@ -38,14 +38,14 @@ pub struct Views {
 }
 
 impl Views {
-    /// Creates the views in their initial state; `wake` is called whenever a view has events.
-    pub fn new(wake: &Wake) -> Self {
+    /// Creates the views in their initial state; their work is listed among `jobs`.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
-            train: TrainView::new(Arc::clone(wake)),
-            study: StudyView::new(Arc::clone(wake)),
-            compare: CompareView::new(Arc::clone(wake)),
-            sensor: SensorView::new(Arc::clone(wake)),
-            live: LiveView::new(Arc::clone(wake)),
+            train: TrainView::new(jobs),
+            study: StudyView::new(jobs),
+            compare: CompareView::new(jobs),
+            sensor: SensorView::new(jobs),
+            live: LiveView::new(jobs),
         }
     }
 

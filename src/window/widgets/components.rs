@@ -403,6 +403,11 @@ pub fn refusal_ui(ui: &mut Ui, field: &Response) {
     }
 }
 
+/// Returns the snapshots before and after the displayed one, where there is one.
+pub fn neighbours(shown: usize, snapshots: usize) -> [Option<usize>; 2] {
+    [shown.checked_sub(1), Some(shown + 1).filter(|next| *next < snapshots)]
+}
+
 /// Shows the number of the displayed snapshot or sample (`what`), which can be typed or dragged, with arrows to the previous
 /// and next one; returns a newly selected one.
 pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> Option<usize> {
@@ -421,7 +426,8 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
     let (title, window) = (format!("Test {what}"), ui.ctx().content_rect().width());
     let dim = Theme::of(ui).palette.dim;
     let label = (window >= 1200.0).then(|| ui.label(RichText::new(&title).color(dim)));
-    arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
+    let [previous, next] = neighbours(shown, snapshots);
+    arrow_ui(ui, "‹", previous, "Previous", "Page up");
     let mut number = shown + 1;
     let suffix = format!(" of {}", snapshots.max(1));
     let field = DragValue::new(&mut number).range(1..=snapshots.max(1)).suffix(suffix);
@@ -433,7 +439,6 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
     } else {
         ui.ctx().accesskit_node_builder(field.id, |node| node.set_label(title));
     }
-    let next = Some(shown + 1).filter(|next| *next < snapshots);
     arrow_ui(ui, "›", next, "Next", "Page down");
     if number != shown + 1 && snapshots > 0 {
         Some(number - 1)

@@ -87,17 +87,17 @@ pub enum DatasetError {
         unit: &'static str,
     },
     /// A span in seconds without an interval.
-    #[error("a memory of {0} needs times: name the time column, or give the memory in samples, as in 20")]
+    #[error("a history of {0:#} needs times: name the time column, or give it in samples, as in 20")]
     NoClock(Span),
     /// A span in seconds, and times that do not advance.
     #[error(
-        "a memory of {0} needs the usual interval between samples, and no time is later than the one before in the same \
+        "a history of {0:#} needs the usual interval between samples, and no time is later than the one before in the same \
          group and row-wire: check the columns of times, groups and row-wires"
     )]
     NoInterval(Span),
     /// A time constant that would have no effect.
     #[error(
-        "a time constant of {span} is shorter than the usual interval between samples{}: it would remember nothing; give a \
+        "a time constant of {span:#} is shorter than the usual interval between samples{}: it would remember nothing; give a \
          longer one or, if the times are not in seconds, the unit of the time column",
         interval_s.map_or_else(String::new, |interval_s| format!(", {} s", format_number(interval_s)))
     )]
@@ -108,10 +108,10 @@ pub enum DatasetError {
         interval_s: Option<f64>,
     },
     /// The interval is not a positive number.
-    #[error("the interval of the memory is {0} s: it must be more than 0")]
+    #[error("the interval of the history is {0} s: it must be more than 0")]
     MemoryInterval(f64),
     /// A lag that is no sample before, or too many.
-    #[error("a lag of {lag} is {samples:.1} samples: it must be from 1 to {LARGEST_LAG}")]
+    #[error("a lag of {lag:#} is {samples:.1} samples: it must be from 1 to {LARGEST_LAG}")]
     Lag {
         /// The lag.
         lag: Span,
@@ -119,11 +119,11 @@ pub enum DatasetError {
         samples: f64,
     },
     /// A time constant of no length.
-    #[error("a time constant of {0} is not possible: it must be more than 0")]
+    #[error("a time constant of {0:#} is not possible: it must be more than 0")]
     Average(Span),
     /// More features, or a larger state, than fit.
     #[error(
-        "a memory of {channels} channels has {features} features and a state of {state} values: use fewer or shorter lags"
+        "a history of {channels} channels has {features} features and a state of {state} values: use fewer or shorter lags"
     )]
     MemoryExcess {
         /// Number of channels.

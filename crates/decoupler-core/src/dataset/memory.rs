@@ -102,13 +102,13 @@ impl Memory {
     }
 }
 
-/// In words: `averages over 2s, 10s and lags of 5, 10, as differences`.
+/// In words: `averages over 2 s, 10 s and lags of 5, 10, as differences`.
 impl fmt::Display for Memory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts = Vec::new();
         for (what, spans) in [("averages over", &self.averages), ("lags of", &self.lags)] {
             if !spans.is_empty() {
-                let spans = Vec::from_iter(spans.iter().map(Span::to_string));
+                let spans = Vec::from_iter(spans.iter().map(|span| format!("{span:#}")));
                 parts.push(format!("{what} {}", spans.join(", ")));
             }
         }
@@ -330,7 +330,7 @@ impl MemoryState {
 
 /// Span of time into the past: a number of samples, or seconds.
 ///
-/// Parses and formats as `20` (samples), `2s`, `100ms` or `5min`.
+/// Parses `20` (samples), `2s`, `100ms` or `5min`; formats as `20` or `2s`, and in sentences (`{:#}`) as `2 s`.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Span {
@@ -392,7 +392,7 @@ impl fmt::Display for Span {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Samples(samples) => write!(f, "{samples}"),
-            Self::Seconds(seconds) => write!(f, "{seconds}s"),
+            Self::Seconds(seconds) => write!(f, "{seconds}{}s", if f.alternate() { " " } else { "" }),
         }
     }
 }

@@ -70,7 +70,7 @@ pub enum Precision {
 
 impl DecoderKind {
     /// All decoders, in the order offered to the user.
-    pub const ALL: [Self; 7] = *Self::VARIANTS.as_array().expect("there are seven");
+    pub const ALL: [Self; Self::VARIANTS.len()] = *Self::VARIANTS.as_array().expect("as many as there are");
 
     /// Largest number of steps of [`DecoderKind::Polish`].
     pub const POLISH_STEPS: usize = 3;

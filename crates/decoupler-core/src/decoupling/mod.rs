@@ -6,9 +6,9 @@
 //! | [`ProgramDecoder`] | evaluates a [`Program`]: trained networks, and all decoders that are fitted to samples |
 //! | [`NewtonDecoder`] | solves Eq. (2) by the [`Estimator`]: the Gauss-Newton method, with prior if the scene has noise; also in a few steps from the answer of another decoder |
 //!
-//! [`DecoderKind`] lists them with their names and meanings, and fits each. A [`Program`] is the only forward pass outside
-//! training; exports print it for other languages. [`resistance_residual`] measures how well an answer explains the
-//! readings, without ground truth.
+//! [`DecoderKind`] lists them with their names and meanings; [`DecoderSet`](crate::evaluation::DecoderSet) fits each. A
+//! [`Program`] is the only forward pass outside training; exports print it for other languages. [`resistance_residual`]
+//! measures how well an answer explains the readings, without ground truth.
 
 mod affine_map;
 mod decoder;

@@ -409,7 +409,7 @@ pub enum RunError {
     Training(#[from] TrainingError),
     /// The run would take more memory than it may use.
     #[error(
-        "this would take about {:.1} GB of memory, and {memory}: use fewer samples, hidden nodes or starts, or the scaled \
+        "this would take about {:.1} GB of memory, and {memory}: use fewer samples, hidden nodes or restarts, or the scaled \
          conjugate gradient (scg)",
         *.bytes as f64 * 1e-9
     )]

@@ -36,7 +36,7 @@ pub enum DocumentKind {
     Checkpoint,
     /// The source of the samples of a run: [`super::RecipeFile`].
     #[strum(to_string = "recipe", message = "decoupler recipe")]
-    #[strum(detailed_message = "correct it, or write it again with inspect --recipe-out")]
+    #[strum(detailed_message = "correct it, or save it again")]
     Recipe,
     /// A sensor model: [`super::SensorFile`].
     #[strum(to_string = "sensor file", message = "decoupler sensor")]

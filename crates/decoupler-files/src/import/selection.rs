@@ -106,7 +106,7 @@ impl Files {
             if factor.is_none() && needs_clock {
                 let (name, unit) = (channel.name, channel.unit.unwrap_or_default());
                 return Err(ImportError::Samples(format!(
-                    "the times in '{name}' are in {unit}, and a memory needs times in s, ms, us, ns, min or h: give the unit \
+                    "the times in '{name}' are in {unit}, and a history needs times in s, ms, us, ns, min or h: give the unit \
                      of the column"
                 )));
             }

@@ -78,7 +78,7 @@ mod tests {
         assert_eq!(memory("64").bytes(), 64_000_000_000);
         assert_eq!(
             memory(" 0.5\n").to_string(),
-            "--memory-limit or DECOUPLER_MEMORY_GB allows 0.5 GB"
+            "the memory limit (DECOUPLER_MEMORY_GB) is 0.5 GB"
         );
         assert_eq!(memory("inf").bytes(), u64::MAX);
         for refused in ["", "much", "0", "-3", "NaN"] {

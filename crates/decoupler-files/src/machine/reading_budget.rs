@@ -19,7 +19,7 @@ pub struct ReadingBudget {
 /// A file needs this number of bytes, which is more than the budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error(
-    "it needs {} of memory, and reading may use {}{}; use a part of it, or raise the limit with the option --memory-limit or \
+    "it needs {} of memory, and reading may use {}{}; use a part of it, or raise the memory limit or \
      the environment variable {} (in GB)",
     size(*.0),
     size(.1.limit),
@@ -103,7 +103,6 @@ mod tests {
         for part in [
             "needs 1.1 GB",
             "may use 1.0 GB, half of the free memory",
-            "--memory-limit",
             "DECOUPLER_MEMORY_GB",
         ] {
             assert!(over.contains(part), "{over}");

@@ -15,11 +15,11 @@ use self::{
     side::Side,
 };
 use crate::window::{
-    job::Wake,
+    job::Jobs,
     plotting::{plots_ui, titled_plots_ui},
     shared::{
-        Effect, NetworkSource, PLACES, RightCard, RunList, RunsRequest, Shared, Shown, Status, View, surface_cards_ui,
-        surface_ui, surfaces_above_ui, target_choice_ui, view_mode_ui,
+        Effect, NetworkSource, Offers, PLACES, RightCard, RunList, RunsRequest, Shared, Shown, Status, View,
+        surface_cards_ui, surface_ui, surfaces_above_ui, target_choice_ui, view_mode_ui,
     },
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
@@ -50,12 +50,12 @@ impl View for CompareView {
         }
     }
 
+    fn take_commands(&mut self, offers: &mut Offers<'_>, _shared: &Shared, _effects: &mut Vec<Effect>) {
+        self.show(offers.offer_samples(self.snapshot, self.snapshots()));
+    }
+
     fn tools_ui(&mut self, ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {
-        let snapshots = self.sides.iter().map(Side::snapshots).max().unwrap_or(0);
-        if let Some(snapshot) = snapshot_ui(ui, "snapshot", self.snapshot, snapshots) {
-            self.snapshot = snapshot;
-            self.sides.iter_mut().for_each(|side| side.show(snapshot));
-        }
+        self.show(snapshot_ui(ui, "snapshot", self.snapshot, self.snapshots()));
     }
 
     fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
@@ -98,16 +98,28 @@ impl View for CompareView {
 }
 
 impl CompareView {
-    /// Creates the view with both sides empty; `wake` is called when there is something new to draw.
-    pub fn new(wake: Wake) -> Self {
+    /// Creates the view with both sides empty.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
-            sides: [Side::new(&wake), Side::new(&wake)],
+            sides: [Side::new(jobs), Side::new(jobs)],
             snapshot: 0,
             card: RightCard::default(),
             removing: None,
             seen: 0,
             node: None,
         }
+    }
+
+    /// Returns the number of snapshots of the larger test set.
+    fn snapshots(&self) -> usize {
+        self.sides.iter().map(Side::snapshots).max().unwrap_or(0)
+    }
+
+    /// Shows a snapshot, if one was asked for.
+    fn show(&mut self, snapshot: Option<usize>) {
+        let Some(snapshot) = snapshot else { return };
+        self.snapshot = snapshot;
+        self.sides.iter_mut().for_each(|side| side.show(snapshot));
     }
 
     /// Fills empty sides with the newest runs, the older one first, once there are more runs than before.

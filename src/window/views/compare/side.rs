@@ -8,7 +8,7 @@ use decoupler_files::{
 use ndarray::Array2;
 
 use crate::window::{
-    job::{Background, Wake},
+    job::{Background, Jobs},
     shared::{LoadedRun, sentence},
     test_view::TestView,
 };
@@ -27,12 +27,12 @@ pub(super) struct Side {
 }
 
 impl Side {
-    pub(super) fn new(wake: &Wake) -> Self {
+    pub(super) fn new(jobs: &Jobs) -> Self {
         Self {
             id: None,
             compared: None,
             target: 0,
-            job: Background::new("compared run", Arc::clone(wake)),
+            job: Background::new("compared run", jobs),
         }
     }
 

@@ -11,11 +11,12 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Slider, Ui, WidgetInfo};
 
-use super::{LiveView, engine::Answered, view::command_ui};
+use super::{LiveView, engine::Answered};
 use crate::window::{
     plotting::{SeriesView, cells_ui},
     shared::{
-        Command, Effect, Look, Shared, card_head_ui, surface_cards_ui, surface_ui, target_choice_ui, view_mode_ui,
+        Command, Effect, Look, Shared, card_head_ui, command_button_ui, surface_cards_ui, surface_ui, target_choice_ui,
+        view_mode_ui,
     },
     surface_view::SurfaceView,
     theme::{Theme, semibold, space, type_size},
@@ -45,12 +46,12 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         card_ui(ui, bar, |ui| replay_bar_ui(ui, view, shared, effects));
         cards = rest.with_max_y(rest.bottom() - gap);
     }
-    let below = |rect: Rect| {
+    let split_below = |rect: Rect| {
         let height = (0.46 * rect.height()).clamp(space(45), space(100));
         let (upper, lower) = rect.split_top_bottom_at_y(rect.bottom() - height);
         (upper.with_max_y(upper.bottom() - gap), lower)
     };
-    let beside = |rect: Rect| {
+    let split_right = |rect: Rect| {
         let width = (0.32 * rect.width()).clamp(space(75), space(100));
         let (left, right) = rect.split_left_right_at_x(rect.right() - width);
         (left.with_max_x(left.right() - gap), right)
@@ -60,19 +61,19 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
     let series = answer.series();
     let has_chart = series.is_some();
     let (main, rest) = if has_chart && !is_narrow {
-        beside(cards)
+        split_right(cards)
     } else {
-        below(cards)
+        split_below(cards)
     };
     let (surfaces, values, figures) = match has_chart {
         true if answer.surfaces.is_empty() => (Rect::NOTHING, main, rest),
         true => {
-            let (surfaces, chart) = below(main);
+            let (surfaces, chart) = split_below(main);
             (surfaces, chart, rest)
         }
         false if is_narrow => (main, Rect::NOTHING, rest),
         false => {
-            let (readings, figures) = beside(rest);
+            let (readings, figures) = split_right(rest);
             (main, readings, figures)
         }
     };
@@ -110,7 +111,9 @@ fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mu
         ui.disable();
     }
     ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-        command_ui(ui, &Command::PlayReplay, view, shared, effects);
+        let play = ghost_button(if replay.is_playing { "⏸ Pause" } else { "▶ Play" });
+        let play = play.min_size([space(18), space(6)].into());
+        command_button_ui(ui, shared, Command::PlayReplay, play, None, effects);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if let Some(speed) = segmented_ui(ui, "Replay speed", &SPEEDS, view.source.speed, false) {
                 view.source.speed = speed;
@@ -182,7 +185,11 @@ fn invitation(view: &LiveView, shared: &Shared) -> String {
     if let Some(running) = &view.running {
         return match &view.shown.counts.last_bad {
             Some(reason) => format!("Malformed lines: {}. Last: {reason}.", view.shown.counts.bad),
-            None => format!("Waiting for the first frame from {}.", running.source_text()),
+            None => format!(
+                "Waiting for the first {} from {}.",
+                view.unit(shared),
+                running.source_text()
+            ),
         };
     }
     let Some((name, _)) = view.network(shared) else {

@@ -236,7 +236,7 @@ fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared) {
             _ => String::new(),
         };
         let (source, hidden) = (file.source_name(), file.settings.hidden);
-        dim_ui(ui, &format!("{source}, {hidden} hidden{row}"));
+        dim_ui(ui, &format!("{source}, {hidden} hidden nodes{row}"));
         let name = if file.problem.has_nodes() { "Z error" } else { "Error" };
         let error = format_percent(file.scores.network.percent());
         dim_ui(ui, &format!("{name} on its test set {error}"));

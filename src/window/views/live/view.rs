@@ -14,7 +14,7 @@ use decoupler_files::{
     export::{Cell, NetworkFile, Table, TableColumn, atomic_write, is_same},
     live::{Input, LiveArray, Recorded, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
 };
-use eframe::egui::{Ui, Widget};
+use eframe::egui::Ui;
 
 use super::{
     cards::{self, surface_figure},
@@ -22,14 +22,12 @@ use super::{
     form::{Picked, SourceForm, SourceKind, form_ui},
 };
 use crate::window::{
-    glossary,
-    job::{Background, Wake},
+    job::{Background, Jobs},
     plotting::{MAX_TRACKS, SeriesView},
     shared::{
         Command, Effect, FileInUse, FileTask, FileWords, Holdings, Matter, Notice, Offers, Shared, Shown, Status, Tone,
-        View,
+        View, command_button_ui,
     },
-    theme::space,
     widgets::{ghost_button, primary_button},
 };
 
@@ -80,8 +78,8 @@ impl Running {
 }
 
 impl LiveView {
-    /// Creates the view without frames; `wake` is called when there are events.
-    pub fn new(wake: Wake) -> Self {
+    /// Creates the view without frames.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             shown: Snapshot::default(),
             running: None,
@@ -92,8 +90,8 @@ impl LiveView {
             node: None,
             chosen: None,
             is_to_be_drawn: false,
-            loading: Background::prompt("network file", Arc::clone(&wake)),
-            job: Background::prompt("live", wake),
+            loading: Background::prompt("network file", jobs),
+            job: Background::prompt("live decoding", jobs),
         }
     }
 
@@ -142,6 +140,11 @@ impl LiveView {
     pub(super) fn has_sensor(&self, shared: &Shared) -> bool {
         let network = self.network(shared);
         network.is_none_or(|(_, file)| file.problem.sensor.is_some())
+    }
+
+    /// Returns the name of what is decoded at a time.
+    pub(super) fn unit(&self, shared: &Shared) -> &'static str {
+        if self.has_sensor(shared) { "frame" } else { "sample" }
     }
 
     /// Returns true while frames are recorded.
@@ -282,7 +285,7 @@ impl LiveView {
     /// Returns the state of the stream, its network and source, and its rate.
     fn status(&self, shared: &Shared) -> Status {
         let (counts, replay) = (&self.shown.counts, &self.shown.replay);
-        let unit = if self.has_sensor(shared) { "frame" } else { "sample" };
+        let unit = self.unit(shared);
         let Some(running) = &self.running else {
             let text = match (self.plan(shared), counts.decoded) {
                 (Err(obstacle), _) => obstacle,
@@ -373,25 +376,44 @@ impl View for LiveView {
         let recorded = self.shown.recorded.as_ref().filter(|_| self.is_recording());
         let recorded = recorded.map(|recorded| FileInUse::Recorded(recorded.path.clone()));
         Holdings {
-            is_computing: self.running.is_some(),
             files: replayed.into_iter().chain(recorded).collect(),
             ..Holdings::default()
         }
     }
 
     fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-        for command in COMMANDS {
-            if offers.offer(command.clone(), obstacle(&command, self, shared).is_none()) {
-                carry_out(&command, self, shared, effects);
+        for command in [STOP, START, Command::Record, Command::ReZero, Command::PlayReplay] {
+            if !offers.offer_unless(command.clone(), obstacle(&command, self, shared)) {
+                continue;
+            }
+            match command {
+                // The thread ends once the sender of its requests is dropped; the last frame stays on the screen.
+                Command::Cancel(_) => self.running = None,
+                Command::Begin(_) => self.start(shared, effects),
+                Command::Record => self.record(shared),
+                Command::ReZero => self.re_zero(),
+                _ => {
+                    let plays = self.shown.replay.is_some_and(|replay| !replay.is_playing);
+                    self.control(move |control, now| control.play(plays, now));
+                }
             }
         }
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let primary = &COMMANDS[usize::from(self.running.is_none())];
-        let others = if self.has_sensor(shared) { &COMMANDS[2..4] } else { &[] };
-        for command in others.iter().rev().chain([primary]) {
-            command_ui(ui, command, self, shared, effects);
+        if self.has_sensor(shared) {
+            command_button_ui(ui, shared, Command::ReZero, ghost_button("Re-zero"), None, effects);
+            let text = if self.is_recording() {
+                "■ End recording"
+            } else {
+                "● Record"
+            };
+            let record = ghost_button(text).selected(self.is_recording());
+            command_button_ui(ui, shared, Command::Record, record, None, effects);
+        }
+        match self.running {
+            Some(_) => command_button_ui(ui, shared, STOP, ghost_button("■ Stop"), None, effects),
+            None => command_button_ui(ui, shared, START, primary_button("▶ Start"), None, effects),
         }
     }
 
@@ -431,29 +453,13 @@ impl View for LiveView {
     }
 }
 
-/// Commands on a source, from right to left.
-const COMMANDS: [Command; 5] = [
-    Command::Cancel("Stop live decoding"),
-    Command::Begin("Start live decoding"),
-    Command::Record,
-    Command::ReZero,
-    Command::PlayReplay,
-];
+/// Ends decoding.
+const STOP: Command = Command::Cancel("Stop live decoding");
 
-/// Returns the text of the button of a command.
-fn button(command: &Command, view: &LiveView) -> &'static str {
-    match command {
-        Command::Cancel(_) => "■ Stop",
-        Command::Begin(_) => "▶ Start",
-        Command::Record if view.is_recording() => "■ End recording",
-        Command::Record => "● Record",
-        Command::ReZero => "Re-zero",
-        _ if view.shown.replay.is_some_and(|replay| replay.is_playing) => "⏸ Pause",
-        _ => "▶ Play",
-    }
-}
+/// Begins decoding.
+const START: Command = Command::Begin("Start live decoding");
 
-/// Returns the reason why a command is not available now, if there is one.
+/// Returns the reason why a command is not available now: whether a source runs, and which, only this view knows.
 fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<String> {
     let (is_running, is_replay) = (view.running.is_some(), view.shown.replay.is_some());
     let reason = match command {
@@ -466,45 +472,6 @@ fn obstacle(command: &Command, view: &LiveView, shared: &Shared) -> Option<Strin
         _ => return None,
     };
     Some(reason.to_owned())
-}
-
-fn carry_out(command: &Command, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    match command {
-        // The thread ends once the sender of its requests is dropped; the last frame stays on the screen.
-        Command::Cancel(_) => view.running = None,
-        Command::Begin(_) => view.start(shared, effects),
-        Command::Record => view.record(shared),
-        Command::ReZero => view.re_zero(),
-        _ => {
-            let plays = view.shown.replay.is_some_and(|replay| !replay.is_playing);
-            view.control(move |control, now| control.play(plays, now));
-        }
-    }
-}
-
-/// Shows the button of a command.
-pub(super) fn command_ui(
-    ui: &mut Ui,
-    command: &Command,
-    view: &mut LiveView,
-    shared: &Shared,
-    effects: &mut Vec<Effect>,
-) {
-    let (about, obstacle, text) = (command.about(), obstacle(command, view, shared), button(command, view));
-    let hint = match about.keys {
-        Some(keys) => format!("{} ({}).", about.name, ui.ctx().format_shortcut(&keys)),
-        None => glossary::UNLOADED_STATE.hint.to_owned(),
-    };
-    let button = ui.add_enabled_ui(obstacle.is_none(), |ui| match command {
-        Command::Begin(_) => primary_button(text).ui(ui),
-        Command::PlayReplay => ui.add(ghost_button(text).min_size([space(18), space(6)].into())),
-        Command::Record => ui.add(ghost_button(text).selected(view.is_recording())),
-        _ => ui.add(ghost_button(text)),
-    });
-    let button = button.inner.on_hover_text(hint);
-    if button.on_disabled_hover_text(obstacle.unwrap_or_default()).clicked() {
-        carry_out(command, view, shared, effects);
-    }
 }
 
 fn values_table(answer: &Answered) -> Table {

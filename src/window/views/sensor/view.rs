@@ -4,7 +4,7 @@ use eframe::egui::Ui;
 use super::{Analysis, figures};
 use crate::window::{
     forms::{self, Fields},
-    job::{Background, Wake},
+    job::{Background, Jobs},
     shared::{Effect, Shared, Shown, SourceKind, Status, Tone, View},
     theme::space,
     widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui},
@@ -34,15 +34,15 @@ pub(super) const RECORDED: &str =
     "This view computes what the readings of a simulated array determine. For a recording, Study measures it.";
 
 impl SensorView {
-    /// Creates the view; `wake` is called after each analysis.
-    pub fn new(wake: Wake) -> Self {
+    /// Creates the view without an analysis.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             analysis: None,
             problem: None,
             axis: 2,
             node: None,
             asked: None,
-            job: Background::new("identifiability", wake),
+            job: Background::new("identifiability analysis", jobs),
         }
     }
 

@@ -30,7 +30,7 @@ use super::{
     value_list::{label, write_percent},
 };
 use crate::window::{
-    shared::Effect,
+    shared::{Command, Effect},
     theme::space,
     widgets::{
         dim_ui, explained_options_ui,
@@ -192,7 +192,7 @@ impl ExperimentForm {
         count_ui(ui, "Folds", hint, &mut validation.folds, 2..=MAX_TRIALS);
         let hint = "Number of shuffles into new folds, for each seed.";
         count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MAX_TRIALS);
-        let of_samples = "As in the paper: rows of one snapshot may be in both the training and the test folds.";
+        let of_samples = "As in the paper: samples of one snapshot may be in both the training and the test folds.";
         let of_snapshots = "Whole snapshots: no training sample is from the same moment as a test sample.";
         let units = [
             (SplitBy::Random, "By sample", of_samples),
@@ -335,7 +335,7 @@ impl Outcome for ExperimentOutcome {
         let setup = Box::new(setup_of(settings, cell.division, self.plan.as_ref()));
         match median {
             Some(trial) if !trial.states.is_empty() => vec![Effect::TakeUp(setup, trial.states.clone())],
-            Some(_) => vec![Effect::TakeSetup(setup), Effect::Train],
+            Some(_) => vec![Effect::TakeSetup(setup), Effect::Do(Command::Train)],
             None => vec![Effect::TakeSetup(setup)],
         }
     }

@@ -13,10 +13,7 @@ mod sweep_folder;
 mod value_list;
 mod view;
 
-use std::{
-    fmt::Debug,
-    sync::{Arc, atomic::AtomicBool},
-};
+use std::{fmt::Debug, sync::Arc};
 
 use decoupler_core::{
     evaluation::{
@@ -124,15 +121,14 @@ impl Form {
         }
     }
 
-    /// Returns the task of the form, checked as far as possible without beginning. `train` is the setup of the Train view;
-    /// times are measured only while it `is_quiet`.
+    /// Returns the task of the form, checked as far as possible without beginning. `train` is the setup of the Train view.
     ///
     /// # Errors
     /// If the form is not valid, or the Train view has no source; the message says what to do.
-    fn task(&self, train: &Result<Setup, String>, is_quiet: &Arc<AtomicBool>) -> Result<Task, String> {
+    fn task(&self, train: &Result<Setup, String>) -> Result<Task, String> {
         let folds = match self {
             Self::Experiment(form) => return form.task(train),
-            Self::Speed(form) => return form.task(train.as_ref()?, is_quiet),
+            Self::Speed(form) => return form.task(train.as_ref()?),
             Self::Recording(folds) => *folds,
         };
         let setup = train.clone()?;

@@ -1,15 +1,7 @@
-//! Speed against accuracy of every decoder, measured on this machine. While another view computes, the measurement waits,
+//! Speed against accuracy of every decoder, measured on this machine. While another job computes, the measurement waits,
 //! because the times would be distorted.
 
-use std::{
-    path::Path,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread,
-    time::Duration,
-};
+use std::{path::Path, sync::Arc, thread, time::Duration};
 
 use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed, Simulation},
@@ -80,11 +72,11 @@ impl Default for SpeedForm {
 }
 
 impl SpeedForm {
-    /// Returns the task on the source of `base`, which measures only while it `is_quiet`.
+    /// Returns the task on the source of `base`.
     ///
     /// # Errors
     /// If the form is not a valid measurement.
-    pub fn task(&self, base: &Setup, is_quiet: &Arc<AtomicBool>) -> Result<Task, String> {
+    pub fn task(&self, base: &Setup) -> Result<Task, String> {
         let plan = self.plan(base)?;
         let (points, source) = (plan.points(), base.source_name());
         let outcome = SpeedOutcome {
@@ -92,10 +84,8 @@ impl SpeedForm {
             source,
             ..SpeedOutcome::default()
         };
-        let is_quiet = Arc::clone(is_quiet);
-        Ok(Task::new(counted(points, "point"), outcome, move |reporter| {
-            measure(&plan, &is_quiet, reporter)
-        }))
+        let size = counted(points, "point");
+        Ok(Task::new(size, outcome, move |reporter| measure(&plan, reporter)))
     }
 
     /// Returns the runs on the source of `base`: one for each noise and preset, or for each method. Decoders of a recording
@@ -267,11 +257,11 @@ impl SpeedPlan {
 /// Interval at which a waiting measurement looks whether it can go on.
 const WAIT: Duration = Duration::from_millis(50);
 
-/// Measures run by run, and reports each point as it is measured; waits unless it `is_quiet`.
-fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Result<(), String> {
+/// Measures run by run, and reports each point as it is measured; waits while another job computes.
+fn measure(plan: &SpeedPlan, reporter: &Reporter) -> Result<(), String> {
     // Asked before every epoch and every decoder, outside the times that are measured.
     let is_cancelled = || {
-        while !is_quiet.load(Ordering::Relaxed) && !reporter.is_cancelled() {
+        while reporter.is_distorted() && !reporter.is_cancelled() {
             thread::sleep(WAIT);
         }
         reporter.is_cancelled()
@@ -484,8 +474,9 @@ mod tests {
     #[test]
     fn the_default_form_is_a_quick_look_at_all_decoders() {
         let plan = plan(&SpeedForm::default(), RunSettings::default());
-        // Five without a network, then two sizes with two precisions and polish.
-        assert_eq!(plan.points(), 2 * (5 + 2 * 3));
+        let alone = DecoderKind::ALL.iter().filter(|kind| !kind.needs_network()).count();
+        // All without a network, then two sizes with two precisions and polish.
+        assert_eq!(plan.points(), 2 * (alone + 2 * 3));
         let best = settings(&plan, 1e-3, Preset::Best);
         let simulation = best.simulation().unwrap();
         assert_eq!((simulation.samples, best.training.stopping.epochs), (2000, 60));
@@ -519,8 +510,10 @@ mod tests {
         let base = RunSettings::measured(RowModel::Shared);
         let recording = |plan: &Plan| Setup::recording(base, plan.clone());
         let of = plan(&SpeedForm::default(), recording(&Plan::default()));
-        // Mean, ridge, radial basis and fuzzy rules once; two methods with two sizes in two precisions.
-        assert_eq!(of.points(), 4 + 2 * 2 * 2);
+        let is_alone = |kind: &&DecoderKind| !kind.needs_network() && !kind.needs_sensor();
+        let alone = DecoderKind::ALL.iter().filter(is_alone).count();
+        // All with neither network nor sensor once; two methods with two sizes in two precisions.
+        assert_eq!(of.points(), alone + 2 * 2 * 2);
         assert!(of.runs.iter().all(|run| run.noise().is_none()), "no noise is simulated");
         let mut all = of.runs.iter().flat_map(|run| &run.decoders);
         assert!(all.all(|kind| !kind.needs_sensor()));

@@ -19,12 +19,17 @@ use decoupler_files::{
 
 use eframe::egui::{Sense, Ui};
 
-use super::{Form, Outcome, Report, StudyEvent, Task, Topic, report::Look, sweep_folder};
+use super::{
+    Form, Outcome, Report, StudyEvent, Task, Topic,
+    report::Look,
+    sweep_folder,
+    view::{BEGIN, CANCEL},
+};
 use crate::window::{
-    job::{Background, Wake},
+    job::{Background, Jobs},
     shared::{
-        Command, Effect, Holdings, Matter, Notice, Offers, Phase, RecordingDraft, Shared, Shown, SourceKind, Status,
-        Tone, Unfinished, View, ViewKind,
+        Effect, Holdings, Matter, Notice, Offers, RecordingDraft, Shared, Shown, SourceKind, Status, Tone, Unfinished,
+        View,
     },
     widgets::{card_ui, placeholder_ui, scrolled_ui},
 };
@@ -48,8 +53,6 @@ pub struct StudyView {
     /// Folders of sweeps that were chosen.
     pub(super) folders: (Sender<PathBuf>, Receiver<PathBuf>),
     job: Background<StudyEvent>,
-    /// True while nothing else computes, which would distort times.
-    is_quiet: Arc<AtomicBool>,
 }
 
 /// Source and settings of the Train view.
@@ -84,8 +87,8 @@ impl fmt::Debug for StudyView {
 }
 
 impl StudyView {
-    /// Creates the view without results; `wake` is called when there are events.
-    pub fn new(wake: Wake) -> Self {
+    /// Creates the view without results.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             topic: Topic::ALL[0],
             forms: Topic::ALL.map(|topic| (topic, Form::new(topic))).into(),
@@ -97,8 +100,7 @@ impl StudyView {
             running: None,
             look: Look::default(),
             folders: channel(),
-            job: Background::new("study", wake),
-            is_quiet: Arc::new(AtomicBool::new(true)),
+            job: Background::new("study", jobs),
         }
     }
 
@@ -127,22 +129,21 @@ impl StudyView {
             self.studies
                 .retain(|_, study| study.took.is_none() || study.setup.as_ref().is_none_or(is_its));
         }
-        self.task = self.forms[&self.topic].task(&self.train, &self.is_quiet);
+        self.task = self.forms[&self.topic].task(&self.train);
         if let Ok(Task { study, .. }) = &mut self.task {
             study.report = study.outcome.report(&self.limits);
         }
         self.checked_on = Some(basis);
     }
 
-    pub(super) fn can_begin(&self) -> bool {
-        self.running.is_none() && self.task.is_ok()
+    /// Returns the reason why the task of the form cannot begin now.
+    fn obstacle(&self) -> Option<String> {
+        let running = self.running.map(|topic| format!("{} is under way.", topic.name()));
+        running.or_else(|| self.task.as_ref().err().cloned())
     }
 
     /// Begins the task of the form.
-    pub(super) fn begin(&mut self, effects: &mut Vec<Effect>) {
-        if !self.can_begin() {
-            return;
-        }
+    fn begin(&mut self, effects: &mut Vec<Effect>) {
         // The form is checked again for the next one.
         self.checked_on = None;
         if let Ok(task) = std::mem::replace(&mut self.task, Err(String::new())) {
@@ -167,7 +168,7 @@ impl StudyView {
     }
 
     /// Cancels the task under way; finished parts are kept.
-    pub(super) fn cancel(&mut self) {
+    fn cancel(&mut self) {
         self.job.abandon();
         self.end();
     }
@@ -213,7 +214,7 @@ impl StudyView {
         let under_way = |topic| Some((topic, self.studies.get(&topic)?));
         let Some((topic, study)) = self.running.and_then(under_way) else {
             let Some((study, took)) = self.study().and_then(|study| Some((study, study.took?))) else {
-                let text = if self.can_begin() {
+                let text = if self.obstacle().is_none() {
                     "Ready: press Run"
                 } else {
                     "Not ready"
@@ -228,8 +229,8 @@ impl StudyView {
             let (name, took) = (self.topic.name(), format_duration(took));
             return Status::new(tone, format!("{name} {ended}: {} in {took}", study.standing()));
         };
-        if topic == Topic::Speed && !self.is_quiet.load(Ordering::Relaxed) {
-            let text = "Waiting: a training or other work is under way and would distort the times.";
+        if let (Topic::Speed, Some(other)) = (topic, self.job.distorted_by()) {
+            let text = format!("Waiting: {other} is under way and would distort the times.");
             return Status::new(Tone::Warning, text);
         }
         let (name, parts) = (topic.name(), study.outcome.parts());
@@ -249,9 +250,6 @@ impl StudyView {
 
 impl View for StudyView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        let trains = matches!(shared.phase, Phase::Preparing | Phase::Training | Phase::Calibrating);
-        let is_alone = shared.working.iter().all(|view| *view == ViewKind::Study);
-        self.is_quiet.store(is_alone && !trains, Ordering::Relaxed);
         self.check(shared);
         let mut changed = None;
         while let Some(event) = self.job.next_event() {
@@ -287,10 +285,11 @@ impl View for StudyView {
     }
 
     fn take_commands(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {
-        if offers.offer(Command::Begin("Begin the study"), self.can_begin()) {
+        if offers.offer_unless(BEGIN, self.obstacle()) {
             self.begin(effects);
         }
-        if offers.offer(Command::Cancel("Cancel the study"), self.running.is_some()) {
+        let is_idle = self.running.is_none();
+        if offers.offer_unless(CANCEL, is_idle.then_some("Nothing is under way.")) {
             self.cancel();
         }
     }
@@ -307,10 +306,9 @@ impl View for StudyView {
                 false => is_unsaved.then(|| format!("{standing} finished, not exported as a table"))?,
             };
             // Watching a folder is no work.
-            (!progress.is_empty()).then(|| Unfinished::new(topic.name(), progress))
+            (!progress.is_empty()).then(|| Unfinished::new("Study", topic.name(), progress))
         };
         Holdings {
-            is_computing: self.running.is_some(),
             unfinished: Topic::ALL.into_iter().filter_map(unfinished).collect(),
             files: Vec::new(),
         }
@@ -320,8 +318,8 @@ impl View for StudyView {
         self.exports(shared.look.colours)
     }
 
-    fn form_ui(&mut self, ui: &mut Ui, _shared: &Shared, effects: &mut Vec<Effect>) {
-        scrolled_ui(ui, "study form", |ui| self.fields_ui(ui, effects));
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        scrolled_ui(ui, "study form", |ui| self.fields_ui(ui, shared, effects));
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {

@@ -11,10 +11,16 @@ use super::{
     sweep_folder::FOLDER,
 };
 use crate::window::{
-    shared::{Command, Effect, FileTask, FileWords, Shared, Shown, ViewKind},
+    shared::{Command, Effect, FileTask, FileWords, Shared, Shown, ViewKind, command_button_ui},
     theme::{semibold, space, type_size},
     widgets::{card_ui, dim_ui, ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui, segmented_ui},
 };
+
+/// Begins the task of the form.
+pub(super) const BEGIN: Command = Command::Begin("Begin the study");
+
+/// Cancels the task under way.
+pub(super) const CANCEL: Command = Command::Cancel("Cancel the study");
 
 const SPECIFICATION: FileWords = FileWords {
     kind: "specification",
@@ -24,7 +30,7 @@ const SPECIFICATION: FileWords = FileWords {
 
 impl StudyView {
     /// Shows the list of topics, the fields of the topic, and the buttons.
-    pub(super) fn fields_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
+    pub(super) fn fields_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         section_heading_ui(ui, "Study");
         let mut topic = self.topic;
         ui.horizontal_wrapped(|ui| {
@@ -45,7 +51,7 @@ impl StudyView {
             Err(problem) => note_ui(ui, problem),
         };
         ui.add_space(space(2));
-        self.buttons_ui(ui, effects);
+        Self::buttons_ui(ui, shared, effects);
         if topic == Topic::Speed {
             let limits = self.limits;
             limits_ui(ui, &mut self.limits);
@@ -69,25 +75,14 @@ impl StudyView {
     }
 
     /// Shows the buttons that begin and cancel.
-    fn buttons_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
+    fn buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let half = ((ui.available_width() - space(2)) / 2.0).floor();
         ui.horizontal(|ui| {
             let size = vec2(half, space(7));
-            let begin_ui = |ui: &mut Ui| ui.add_sized(size, primary_button("▶ Run"));
-            let begin = ui.add_enabled_ui(self.can_begin(), begin_ui).inner;
-            let why_not = match &self.running {
-                Some(topic) => format!("{} is under way", topic.name()),
-                None => "The note above says what to change".to_owned(),
-            };
-            let hint = Command::Begin("Begin the study").about().tooltip(ui.ctx());
-            if begin.on_hover_text(hint).on_disabled_hover_text(why_not).clicked() {
-                self.begin(effects);
-            }
-            let cancel = ui.add_enabled(self.running.is_some(), ghost_button("■ Cancel").min_size(size));
-            let hint = Command::Cancel("Cancel the study").about().tooltip(ui.ctx());
-            if cancel.on_hover_text(hint).clicked() {
-                self.cancel();
-            }
+            let begin = |ui: &mut Ui| ui.add_sized(size, primary_button("▶ Run"));
+            command_button_ui(ui, shared, BEGIN, begin, None, effects);
+            let cancel = ghost_button("■ Cancel").min_size(size);
+            command_button_ui(ui, shared, CANCEL, cancel, None, effects);
         });
     }
 
@@ -188,7 +183,7 @@ impl StudyView {
         }
         if open.clicked() {
             effects.extend(study.outcome.open(look.page, item));
-            effects.push(Effect::Show(ViewKind::Train));
+            effects.push(Effect::Do(Command::Show(ViewKind::Train)));
         }
     }
 

@@ -480,16 +480,17 @@ pub fn readings_of_view_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
 impl TrainView {
     /// Offers each chart, and the steps through sections.
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
+        const SHOWN: &str = "It is the displayed chart.";
         // The readings have their own card if there is room.
         let has_readings = !shared.has_report(offers.ctx.content_rect().width());
         for chart in charts(shared, has_readings) {
-            if offers.offer(Command::Chart(chart.name), chart.name != self.tab) {
+            if offers.offer_unless(Command::Chart(chart.name), (chart.name == self.tab).then_some(SHOWN)) {
                 self.tab = chart.name;
             }
         }
         let is_recording = shared.source == SourceKind::Recording;
         for chart in upper_charts(shared).filter(|_| is_recording) {
-            if offers.offer(Command::Chart(chart.name), chart.name != self.upper) {
+            if offers.offer_unless(Command::Chart(chart.name), (chart.name == self.upper).then_some(SHOWN)) {
                 self.upper = chart.name;
             }
         }
@@ -498,16 +499,15 @@ impl TrainView {
         };
         for (by, command) in [(-1, Command::PreviousSection), (1, Command::NextSection)] {
             let stepped = self.section.stepped(by, skin);
-            if offers.offer(command, stepped.is_some()) {
+            if offers.offer_unless(command, stepped.is_none().then_some("It is the last one.")) {
                 self.section = stepped.unwrap_or(self.section);
             }
         }
-        let (command, other) = match self.section.along {
-            Along::RowWires => (Command::SectionAlongColumns, Along::ColumnWires),
-            Along::ColumnWires => (Command::SectionAlongRows, Along::RowWires),
-        };
-        if offers.offer(command, true) {
-            self.section.along = other;
+        if offers.offer(Command::TurnSection) {
+            self.section.along = match self.section.along {
+                Along::RowWires => Along::ColumnWires,
+                Along::ColumnWires => Along::RowWires,
+            };
         }
     }
 }

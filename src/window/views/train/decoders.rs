@@ -25,7 +25,7 @@ use eframe::egui::{Button, CollapsingHeader, Ui, Vec2, WidgetInfo, accesskit::Ro
 
 use crate::window::{
     glossary,
-    job::{Background, JobError, Report, Wake},
+    job::{Background, JobError, Jobs, Report},
     shared::{Exporting, NetworkSource, Phase, Shared, target_choice_ui},
     theme::{Palette, Theme, space},
     widgets::{ColumnWidth, TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
@@ -109,9 +109,8 @@ impl std::fmt::Debug for Decoders {
 }
 
 impl Decoders {
-    /// Nothing measured yet. `wake` is called after each decoder and at the end; those of the kinds `always` are measured
-    /// while the table is folded, too.
-    pub fn new(wake: Wake, always: &'static [DecoderKind]) -> Self {
+    /// Nothing measured yet. Those of the kinds `always` are measured while the table is folded, too.
+    pub fn new(jobs: &Jobs, always: &'static [DecoderKind]) -> Self {
         Self {
             is_open: false,
             measured: None,
@@ -120,8 +119,8 @@ impl Decoders {
             asked: None,
             fitted: Arc::default(),
             job: match always {
-                [] => Background::new("decoders", wake),
-                _ => Background::prompt("decoders of a press", wake),
+                [] => Background::new("comparison of decoders", jobs),
+                _ => Background::prompt("decoders of a press", jobs),
             },
         }
     }
@@ -320,7 +319,7 @@ const WORST_MM: Figure = Figure {
 
 const FRAME_TIME: Figure = Figure {
     heading: "µs",
-    meaning: || "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
+    meaning: || "Time to decode a frame (all row-wires, or one sample of a recording) on one thread, in µs: the median of many.",
     value: |report, _, _| Some(report.frame_us),
 };
 
@@ -509,7 +508,7 @@ mod tests {
         let run = Run::prepare(settings).unwrap();
         let (waking, woken) = channel();
         let wake = move || waking.send(()).unwrap_or(());
-        let mut decoders = Decoders::new(Arc::new(wake), &[]);
+        let mut decoders = Decoders::new(&Jobs::new(Arc::new(wake)), &[]);
         let mut impossible = settings;
         impossible.simulation_mut().unwrap().samples = 0;
         decoders.is_open = true;
@@ -538,7 +537,7 @@ mod tests {
         let mut measured = DecoderResult::pending(&problem);
         let place = measured.iter().position(|result| result.kind == kind).unwrap();
         measured[place].report = Some(report);
-        let mut decoders = Decoders::new(Arc::new(|| ()), &[]);
+        let mut decoders = Decoders::new(&Jobs::new(Arc::new(|| ())), &[]);
         (decoders.is_open, decoders.measured) = (true, Some(measured));
         Harness::new_ui(move |ui| {
             decoders_ui(ui, &mut decoders, (&problem, None), &mut 0, None);

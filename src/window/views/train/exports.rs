@@ -79,7 +79,7 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
     });
     shown.push(Shown::table("Decoder table", stem("decoders"), decoders));
     let standing = run.and_then(|run| match shared.phase {
-        _ if run.kept.is_some() => Err("A run of the list cannot be continued: train again.".to_owned()),
+        _ if run.kept.is_some() => Err("A run of the list has no checkpoint: train again.".to_owned()),
         Phase::Paused | Phase::Calibrating | Phase::Ended(_) => Ok(checkpoint_task(run)),
         _ => Err("A training under way cannot be saved: pause it first.".to_owned()),
     });

@@ -18,12 +18,12 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Button, Frame, Layout, Margin, Response, RichText, Stroke, Ui, WidgetInfo, accesskit::Role};
 
-use super::{decoders::decoders_ui, press::press_section_ui, view::TrainView};
+use super::{decoders::decoders_ui, press::press_section_ui, recording::Fix, view::TrainView};
 use crate::window::{
     glossary,
     shared::{
-        Effect, ExportLine, Exporting, NetworkSource, RunResult, RunView, Shared, SourceKind, ViewKind, error_table_ui,
-        sentence, targets_table_ui,
+        Command, Effect, ExportLine, Exporting, NetworkSource, RunResult, RunView, Shared, SourceKind, ViewKind,
+        command_button_ui, error_table_ui, sentence, targets_table_ui,
     },
     test_view::Skin,
     theme::{Theme, radius, space, type_size},
@@ -49,7 +49,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         ui.add_space(space(1));
         let is_old = shared.is_old(run);
         if is_old {
-            previous_ui(ui, run, effects);
+            previous_ui(ui, run, shared, effects);
         }
         let remarks = match (view.scrub.epoch(), run.stop_reason) {
             (None, Some(reason)) if !is_old => verdict_ui(ui, view, shared, (run, result, reason), effects),
@@ -92,7 +92,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             }
             details_ui(ui, view, (run, result), effects);
         });
-        use_ui(ui, run, effects);
+        use_ui(ui, run, shared, effects);
         runs_ui(ui, shared, effects);
     });
 }
@@ -101,12 +101,10 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
 pub const OLD: f32 = 0.5;
 
 /// Says that the settings have changed, with the ways out.
-fn previous_ui(ui: &mut Ui, run: &RunView, effects: &mut Vec<Effect>) {
+fn previous_ui(ui: &mut Ui, run: &RunView, shared: &Shared, effects: &mut Vec<Effect>) {
     dim_ui(ui, "Result of the previous settings.");
     ui.horizontal(|ui| {
-        if ui.add(ghost_button("Train again")).clicked() {
-            effects.push(Effect::Train);
-        }
+        command_button_ui(ui, shared, Command::Train, ghost_button("Train again"), None, effects);
         let hint = "Goes back to the settings of this result.";
         if ui.add(ghost_button("Undo changes")).on_hover_text(hint).clicked() {
             let plan = run.asked.plan.as_deref().map(|plan| (**plan).clone());
@@ -157,29 +155,24 @@ fn details_ui(ui: &mut Ui, view: &mut TrainView, (run, result): (&RunView, &RunR
 }
 
 /// What can be done with a trained network.
-fn use_ui(ui: &mut Ui, run: &RunView, effects: &mut Vec<Effect>) {
+fn use_ui(ui: &mut Ui, run: &RunView, shared: &Shared, effects: &mut Vec<Effect>) {
     section_heading_ui(ui, "Use it");
     let exporting = |line| Effect::Export(Box::new(Exporting::new(line, "")));
-    let decode = NetworkSource::of(run).decode();
-    let hint = decode.words.description;
     let live = "Decodes readings as they arrive.";
     let [network, report] = [ExportLine::Network, ExportLine::Report].map(|line| (line.words().1, exporting(line)));
     let buttons = [
-        ("Decode file…", hint, Effect::ChooseFile(decode)),
-        ("Test it live", live, Effect::Show(ViewKind::Live)),
+        ("Test it live", live, Effect::Do(Command::Show(ViewKind::Live))),
         ("Export network…", network.0, network.1),
         ("Save report…", report.0, report.1),
     ];
     let width = 0.5 * (ui.available_width() - space(1));
     ui.spacing_mut().item_spacing = [space(1); 2].into();
+    let button = |text| ghost_button(text).min_size([width, space(7)].into());
     ui.horizontal_wrapped(|ui| {
+        command_button_ui(ui, shared, Command::DecodeFile, button("Decode file…"), None, effects);
         for (text, hint, effect) in buttons {
-            let button = ghost_button(text).min_size([width, space(7)].into());
-            if ui
-                .add_enabled(run.stop_reason.is_some(), button)
-                .on_hover_text(hint)
-                .clicked()
-            {
+            let shown = ui.add_enabled(run.stop_reason.is_some(), button(text));
+            if shown.on_hover_text(hint).clicked() {
                 effects.push(effect);
             }
         }
@@ -282,8 +275,14 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
     );
 }
 
-/// A remark on a result, and the button that mends its cause.
-type Remark = (String, Option<(String, Vec<Effect>)>);
+/// A remark on a result, and what is offered to fix its cause.
+type Remark<'a> = (String, Option<Offered<'a>>);
+
+/// A button of a remark.
+enum Offered<'a> {
+    Fix(&'a Fix),
+    UseRidge,
+}
 
 /// Reports the most urgent remark with what mends it, or by how much the network is better; returns the other remarks.
 fn verdict_ui(
@@ -293,9 +292,9 @@ fn verdict_ui(
     (run, result, reason): (&RunView, &RunResult, StopReason),
     effects: &mut Vec<Effect>,
 ) -> Vec<String> {
-    let cures = view.recording.cures(shared).into_iter();
-    let cures = cures.map(|(text, button, effects)| (text, Some((button, effects))));
-    let mut remarks = Vec::<Remark>::from_iter(cures);
+    let fixes = view.recording.fixes.iter();
+    let fixes = fixes.map(|fix| (fix.problem.clone(), Some(Offered::Fix(fix))));
+    let mut remarks = Vec::<Remark<'_>>::from_iter(fixes);
     remarks.extend(result.defect.as_ref().map(|defect| (capitalised(defect), None)));
     let praise = match (result.errors.nodes(), run.baselines.linear.nodes()) {
         (Some(errors), Some(linear)) => of_nodes(run, (result, errors, linear), reason, &mut remarks),
@@ -303,11 +302,13 @@ fn verdict_ui(
     };
     let mut remarks = remarks.into_iter();
     match (remarks.next(), praise) {
-        (Some((text, cure)), _) => {
+        (Some((text, offered)), _) => {
             note_ui(ui, &sentence(&text));
-            let (name, cure) = cure.unzip();
-            if name.is_some_and(|name| ui.add(primary_button(&name)).clicked()) {
-                effects.extend(cure.unwrap_or_default());
+            let mut is_clicked = |name: &str| ui.add(primary_button(name)).clicked();
+            match offered {
+                Some(Offered::Fix(fix)) if is_clicked(&fix.button) => effects.extend(fix.effects(shared)),
+                Some(Offered::UseRidge) if is_clicked("Use ridge") => effects.push(Effect::UseRidge),
+                _ => {}
             }
         }
         (None, Some(praise)) => good_ui(ui, &praise),
@@ -321,7 +322,7 @@ fn of_nodes(
     run: &RunView,
     (result, errors, linear): (&RunResult, &Errors, &Errors),
     reason: StopReason,
-    remarks: &mut Vec<Remark>,
+    remarks: &mut Vec<Remark<'_>>,
 ) -> Option<String> {
     let (settings, baselines) = (run.settings(), &run.baselines);
     let of_network = error_remarks(settings, &run.scores(result), Some(reason));
@@ -349,7 +350,7 @@ fn of_nodes(
 }
 
 /// Adds the remarks on the errors of targets; returns by how much the network is better than ridge regression.
-fn of_targets(run: &RunView, result: &RunResult, remarks: &mut Vec<Remark>) -> Option<String> {
+fn of_targets(run: &RunView, result: &RunResult, remarks: &mut Vec<Remark<'_>>) -> Option<String> {
     let pairs = result.errors.targets().iter().zip(run.baselines.linear.targets());
     let ratios = pairs.map(|(network, ridge)| ridge.rmse / network.rmse);
     let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
@@ -358,12 +359,11 @@ fn of_targets(run: &RunView, result: &RunResult, remarks: &mut Vec<Remark>) -> O
         run.kept.is_none() && run.stop_reason != Some(StopReason::Stopped) && result.networks.only().is_some();
     let worse = describe_worse_than_ridge(&run.problem, &run.scores(result));
     for remark in &result.remarks {
-        let cure =
-            (may_use_ridge && worse.as_ref() == Some(remark)).then(|| ("Use ridge".to_owned(), vec![Effect::UseRidge]));
-        remarks.push((remark.clone(), cure));
+        let offered = (may_use_ridge && worse.as_ref() == Some(remark)).then_some(Offered::UseRidge);
+        remarks.push((remark.clone(), offered));
     }
     // What has a button comes first.
-    remarks.sort_by_key(|(_, cure)| cure.is_none());
+    remarks.sort_by_key(|(_, offered)| offered.is_none());
     let (low, high) = extreme(f64::min).zip(extreme(f64::max))?;
     let times = if low == high { low } else { format!("{low} to {high}") };
     let holds = match result.coverage.iter().any(Option::is_some) {

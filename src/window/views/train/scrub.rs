@@ -7,7 +7,7 @@ use decoupler_core::{decoupling::ProgramDecoder, evaluation::TestErrors, problem
 use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
-    job::{Background, JobError, Wake},
+    job::{Background, JobError, Jobs},
     shared::{Effect, Matter, Notice, RunResult, Shared},
     test_view::TestView,
     theme::{Theme, space, type_size},
@@ -35,13 +35,13 @@ pub struct ScrubState {
 }
 
 impl ScrubState {
-    /// Starts on the latest epoch. `wake` is called when a result is there.
-    pub fn new(wake: Wake) -> Self {
+    /// Starts on the latest epoch.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             of: None,
             wanted: None,
             result: None,
-            job: Background::prompt("past network", wake),
+            job: Background::prompt("past network", jobs),
             replay: None,
         }
     }

@@ -17,15 +17,15 @@ use super::{
     surfaces::surfaces_ui,
 };
 use crate::window::{
-    job::Wake,
+    job::Jobs,
     plotting::SeriesView,
     shared::{
-        Command, Effect, Holdings, NetworkSource, Offers, Phase, RightCard, RunResult, Shared, Shown, SourceKind,
-        Status, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, NetworkSource, Offers, RightCard, RunResult, Shared, Shown, SourceKind, Status,
+        Unfinished, View, run_buttons_ui,
     },
     test_view::{Drawing, TestView},
     theme::space,
-    widgets::{card_ui, snapshot_ui},
+    widgets::{card_ui, dim_ui, snapshot_ui},
 };
 
 impl View for TrainView {
@@ -40,10 +40,9 @@ impl View for TrainView {
             let results = self.decoders.measured.as_deref().unwrap_or_default();
             let measured = results.iter().filter(|result| result.report.is_some()).count();
             let progress = format!("{measured} of {} measured", counted(results.len(), "decoder"));
-            Unfinished::new("More decoders", progress)
+            Unfinished::new("Train", "More decoders", progress)
         });
         Holdings {
-            is_computing: false,
             unfinished: Vec::from_iter(unfinished),
             files: self.recording.files_in_use(),
         }
@@ -57,43 +56,32 @@ impl View for TrainView {
                 .take_pointer(offers.ctx, shared.skin().map(|skin| &**skin), lit);
             self.follow(shared);
         }
-        let phase = shared.phase;
-        let (pause, paused) = match phase {
-            Phase::Paused => (Command::ResumeTraining, Effect::Resume),
-            _ => (Command::PauseTraining, Effect::Pause),
-        };
-        let can_pause = matches!(phase, Phase::Training | Phase::Paused);
-        for (command, is_possible, effect) in [
-            (Command::Train, !phase.is_busy(), Effect::Train),
-            (Command::TrainLonger, shared.can_continue(), Effect::Continue),
-            (pause, can_pause, paused),
-            (Command::StopTraining, phase.is_busy(), Effect::Stop),
+        for command in [
+            Command::Train,
+            Command::TrainLonger,
+            Command::PauseTraining,
+            Command::StopTraining,
         ] {
-            if offers.offer(command, is_possible) {
-                effects.push(effect);
+            if offers.offer(command.clone()) {
+                effects.push(Effect::Do(command));
             }
         }
-        if offers.offer(Command::OpenFiles, !phase.is_busy()) {
+        if offers.offer(Command::OpenFiles) {
             effects.push(Effect::ChooseFile(self.recording.open_task()));
         }
-        let ended = shared.shown_run().filter(|run| run.stop_reason.is_some());
-        if offers.offer(Command::DecodeFile, ended.is_some())
-            && let Some(run) = ended
+        if offers.offer(Command::DecodeFile)
+            && let Some(run) = shared.shown_run()
         {
             effects.push(Effect::ChooseFile(NetworkSource::of(run).decode()));
         }
         if let Some(skin) = shared.skin()
-            && offers.offer(Command::PressMiddle, true)
+            && offers.offer(Command::PressMiddle)
         {
             self.press.press_middle(skin);
         }
         let snapshots = shared.test().map_or(0, TestView::snapshots);
-        let has_next = self.snapshot + 1 < snapshots;
-        if offers.offer(Command::NextSample, has_next) {
-            self.show_snapshot(self.snapshot + 1);
-        }
-        if offers.offer(Command::PreviousSample, self.snapshot > 0) {
-            self.show_snapshot(self.snapshot - 1);
+        if let Some(snapshot) = offers.offer_samples(self.snapshot, snapshots) {
+            self.show_snapshot(snapshot);
         }
         self.offer_charts(offers, shared);
     }
@@ -104,8 +92,11 @@ impl View for TrainView {
             SourceKind::Recording => "sample",
         };
         let snapshots = shared.test().map_or(0, TestView::snapshots);
-        // In a very narrow window the keys remain.
-        if ui.ctx().content_rect().width() >= 800.0 {
+        let width = ui.ctx().content_rect().width();
+        // In a narrow window the status line and the keys remain.
+        if let Some(obstacle) = shared.missing_recording().filter(|_| width >= 1200.0 && snapshots == 0) {
+            dim_ui(ui, obstacle);
+        } else if width >= 800.0 {
             if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, snapshots) {
                 self.show_snapshot(snapshot);
             }
@@ -195,8 +186,8 @@ pub struct TrainView {
 }
 
 impl TrainView {
-    /// Nothing drawn yet. `wake` is called when a decoder is measured.
-    pub fn new(wake: Wake) -> Self {
+    /// Nothing drawn yet.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             snapshot: 0,
             target: 0,
@@ -208,10 +199,10 @@ impl TrainView {
             section: SectionChoice::default(),
             has_error_bars: false,
             drawn: Drawn::default(),
-            press: PressState::new(&wake),
-            scrub: ScrubState::new(Arc::clone(&wake)),
-            recording: RecordingEditor::new(&wake),
-            decoders: Decoders::new(wake, &[]),
+            press: PressState::new(jobs),
+            scrub: ScrubState::new(jobs),
+            recording: RecordingEditor::new(jobs),
+            decoders: Decoders::new(jobs, &[]),
         }
     }
 
@@ -247,12 +238,12 @@ impl TrainView {
                 .min(0.6 * lower.width()),
             false => (0.4 * lower.width()).floor(),
         };
-        let (mut charts, beside) = lower.split_left_right_at_x(lower.right() - width);
+        let (mut charts, right) = lower.split_left_right_at_x(lower.right() - width);
         charts.max.x -= gap;
         if is_narrow {
-            card_ui(ui, beside, |ui| report::report_ui(ui, self, shared, effects));
+            card_ui(ui, right, |ui| report::report_ui(ui, self, shared, effects));
         } else if has_sensor {
-            card_ui(ui, beside, |ui| {
+            card_ui(ui, right, |ui| {
                 readings_head_ui(ui, self.drops_percent());
                 readings_of_view_ui(ui, self, shared);
             });

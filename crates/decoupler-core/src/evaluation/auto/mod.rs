@@ -199,7 +199,7 @@ impl Tried {
             Quantity::LogResistance => "log readings".to_owned(),
         }];
         let mut list = |name: &str, spans: &[Span]| {
-            let spans = Vec::from_iter(spans.iter().map(Span::to_string));
+            let spans = Vec::from_iter(spans.iter().map(|span| format!("{span:#}")));
             parts.extend((!spans.is_empty()).then(|| format!("{name} {}", spans.join(", "))));
         };
         list("lags", &self.memory.lags);
@@ -275,7 +275,7 @@ impl AutoRecord {
     pub fn leaks(&self, targets: &[Channel]) -> impl Iterator<Item = String> {
         self.leaks.iter().map(|(target, [now, past])| {
             format!(
-                "possible leak: a memory predicts {} (R² {}), but the readings of the moment do not (R² {}). Either the order \
+                "possible leak: the history of readings predicts {} (R² {}), but the readings of the moment do not (R² {}). Either the order \
                  of recording gives it away, which does not help in use, or the sensor responds to changes only; give a memory \
                  if it is the latter",
                 targets.get(*target).map_or("a target", |target| &target.name),

@@ -159,7 +159,7 @@ fn what_only_a_memory_predicts_is_reported_and_not_used() {
     assert!(
         remarks
             .iter()
-            .any(|remark| remark.starts_with("possible leak: a memory predicts y")),
+            .any(|remark| remark.starts_with("possible leak: the history of readings predicts y")),
         "{remarks:?}"
     );
 }

@@ -15,22 +15,22 @@ use thiserror::Error;
 #[strum(serialize_all = "lowercase")]
 pub enum BundleFormat {
     /// ONNX graph.
-    #[strum(message = "ONNX", detailed_message = "a graph (opset 13) for ONNX runtimes")]
+    #[strum(message = "ONNX")]
+    #[strum(detailed_message = "A folder with an ONNX graph (opset 13) and golden readings.")]
     Onnx,
     /// C99 source.
+    #[strum(message = "C99")]
     #[strum(
-        message = "C99",
-        detailed_message = "one header and one source in C, with a self-test"
+        detailed_message = "A folder with one header and one source in C99 and a self-test. fixed16 uses integer arithmetic only, for microcontrollers."
     )]
     C99,
     /// MATLAB or GNU Octave function.
-    #[strum(
-        message = "MATLAB/Octave",
-        detailed_message = "one function file for MATLAB and GNU Octave"
-    )]
+    #[strum(message = "MATLAB/Octave")]
+    #[strum(detailed_message = "A folder with one function for MATLAB and GNU Octave and golden readings.")]
     Matlab,
     /// Weights and a program for NumPy.
-    #[strum(message = "NumPy", detailed_message = "weights (.npz) and a decode.py")]
+    #[strum(message = "NumPy")]
+    #[strum(detailed_message = "A folder with the weights, a short decode.py and golden readings.")]
     NumPy,
 }
 
@@ -69,6 +69,11 @@ impl BundleFormat {
         self.get_message().unwrap_or_default()
     }
 
+    /// What is written, in sentences.
+    pub fn meaning(self) -> &'static str {
+        self.get_detailed_message().unwrap_or_default()
+    }
+
     /// Precisions in which the format is written, the most accurate first.
     pub fn precisions(self) -> &'static [BundlePrecision] {
         use BundlePrecision::{Double, Fixed16, Single};
@@ -81,11 +86,8 @@ impl BundleFormat {
 
     /// Help text on all formats.
     pub fn help() -> String {
-        let contents = |format: &Self| format.get_detailed_message().unwrap_or_default();
-        let all = Self::VARIANTS
-            .iter()
-            .map(|format| format!("{format}: {}", contents(format)));
-        Vec::from_iter(all).join("; ")
+        let line = |format: &Self| format!("{format}: {}", format.meaning().trim_end_matches('.'));
+        Vec::from_iter(Self::VARIANTS.iter().map(line)).join("; ")
     }
 
     /// Checks that a decoder is exported in this format with this precision.
@@ -187,17 +189,16 @@ impl BundleDecoder {
 
 impl Named for BundleDecoder {
     const WHAT: &'static str = "a decoder";
-    const ALL: &'static [Self] = &[
-        Self::Kind(DecoderKind::Mean),
-        Self::Kind(DecoderKind::Ridge),
-        Self::Kind(DecoderKind::Network),
-        Self::Kind(DecoderKind::RadialBasis),
-        Self::Kind(DecoderKind::Fuzzy),
-        Self::Kind(DecoderKind::Newton),
-        Self::Kind(DecoderKind::Polish),
-        Self::Linear,
-        Self::Chosen,
-    ];
+    const ALL: &'static [Self] = &{
+        let mut all = [Self::Chosen; DecoderKind::ALL.len() + 2];
+        let mut index = 0;
+        while index < DecoderKind::ALL.len() {
+            all[index] = Self::Kind(DecoderKind::ALL[index]);
+            index += 1;
+        }
+        all[index] = Self::Linear;
+        all
+    };
 }
 
 impl Default for BundleDecoder {

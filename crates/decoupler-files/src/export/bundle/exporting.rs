@@ -126,13 +126,13 @@ fn in_single(contents: &mut Contents, report: &mut BundleReport) -> Result<(), B
         let is_taken = |&reading: &f64| (reading as f32).is_finite() && (!positive || reading as f32 > 0.0);
         if let Some(channel) = row.readings.iter().position(|reading| !is_taken(reading)) {
             return Err(BundleError::Unsuitable(format!(
-                "a reading of {:.1e} ({}) is beyond the range of the numbers in which the bundle takes it: give --precision f64",
+                "a reading of {:.1e} ({}) is beyond the range of the numbers in which the bundle takes it: choose precision f64",
                 row.readings[channel], contents.meaning.inputs[channel].name
             )));
         }
     }
     let is_finite = |value: f64| (value as f32).is_finite();
-    check_constants(contents, is_finite, "single precision: give --precision f64")?;
+    check_constants(contents, is_finite, "single precision: choose precision f64")?;
     let rounding = contents.golden.rounding(&contents.exported.program, &contents.scales)?;
     let change = contents.in_words(rounding);
     let cure = cure(contents);
@@ -217,7 +217,7 @@ fn cure(contents: &Contents) -> String {
         }
         false => &format!("{} for one that amplifies less", contents.meaning.smaller_weights()),
     };
-    format!("give --precision f64, or {smaller}")
+    format!("choose precision f64, or {smaller}")
 }
 
 /// Checks that all constants are finite; `beyond` names the precision and what to do if they are not.

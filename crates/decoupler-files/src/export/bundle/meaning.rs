@@ -40,7 +40,7 @@ impl Meaning {
 
     /// A way to train a network with smaller weights, which amplifies less.
     pub(super) fn smaller_weights(&self) -> &'static str {
-        self.either("train with noise (--noise)", "train with fewer hidden nodes or epochs")
+        self.either("train with noise", "train with fewer hidden nodes or epochs")
     }
 
     /// A sentence on what the decoder does, without its full stop.

@@ -1,4 +1,4 @@
-//! Bundles: decoders exported for other programs (feature `bundle`).
+//! Bundles: decoders exported for other programs.
 //!
 //! What a decoder computes is a program of the core, extended by prediction intervals and the count of readings outside of the
 //! range in training (`exported_program`). A format is a printer of its nodes: an ONNX graph, C99 in floating point or in

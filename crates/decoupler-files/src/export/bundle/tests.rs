@@ -315,7 +315,7 @@ fn refused_exports_leave_no_files() {
         ),
         (
             export_bundle(&large, BundleFormat::NumPy, BundlePrecision::Single, &path),
-            "give --precision f64",
+            "choose precision f64",
         ),
     ];
     for (refused, expected) in cases {
@@ -392,7 +392,7 @@ fn single_precision_is_judged_by_the_readings_of_the_caller() {
                     "{message} {largest}"
                 );
                 assert!(
-                    message.contains(" mm") && message.contains("--precision f64"),
+                    message.contains(" mm") && message.contains("precision f64"),
                     "{message}"
                 );
                 assert!(!path.exists());

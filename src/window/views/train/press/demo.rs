@@ -13,7 +13,7 @@ use decoupler_core::{
 use decoupler_files::machine::memory_budget;
 
 use crate::window::{
-    job::{Background, Wake},
+    job::{Background, Jobs},
     test_view::Skin,
     views::train::decoders::Subject,
 };
@@ -30,9 +30,9 @@ pub(super) struct Demo {
 }
 
 impl Demo {
-    pub(super) fn new(wake: &Wake) -> Self {
+    pub(super) fn new(jobs: &Jobs) -> Self {
         Self {
-            job: Background::prompt("demo network", Arc::clone(wake)),
+            job: Background::prompt("demo network", jobs),
             settings: None,
             subject: None,
         }

@@ -25,7 +25,7 @@ use self::{
 };
 use super::decoders::{Decoders, Subject};
 use crate::window::{
-    job::{Background, JobError, Wake},
+    job::{Background, JobError, Jobs},
     shared::{RunResult, Shared},
     surface_view::SurfaceViewResponse,
     test_view::Skin,
@@ -57,17 +57,17 @@ pub struct PressState {
 type Answered = (Question, Result<Shown, String>);
 
 impl PressState {
-    /// Nothing pressed. `wake` is called when something was computed in the background.
-    pub fn new(wake: &Wake) -> Self {
+    /// Nothing pressed.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             finger: Finger::default(),
             place_mm: None,
             grip_mm: None,
             target: None,
             answered: None,
-            solving: Background::prompt("press", Arc::clone(wake)),
-            decoders: Decoders::new(Arc::clone(wake), &[DecoderKind::Mean]),
-            demo: Demo::new(wake),
+            solving: Background::prompt("press", jobs),
+            decoders: Decoders::new(jobs, &[DecoderKind::Mean]),
+            demo: Demo::new(jobs),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Table of the columns of all files with their meanings.
 //!
-//! It shows the range, the histogram and remarks of each column, and edits its meaning and unit.
+//! It shows the range, the histogram and remarks of each column, and edits its meaning and unit. Columns selected by their
+//! names get a meaning together.
 
 use std::cell::Cell;
 
@@ -10,19 +11,21 @@ use decoupler_files::{
     figure::tick_text,
     import::{ColumnKind, ColumnSummary, InspectedFile, Meaning, Variable},
 };
-use eframe::egui::{Color32, Rect, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2, vec2};
+use eframe::egui::{
+    Button, Color32, Modifiers, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2, vec2,
+};
 
 use super::{
     editor::RecordingEditor,
     import::{Import, file_name},
 };
 use crate::window::{
-    theme::{Palette, Theme, space},
+    theme::{Palette, Theme, semibold, space, type_size},
     widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView, fields::combo_ui},
 };
 
 const MEANING_WIDTH: f32 = space(23);
-const UNIT_WIDTH: f32 = space(16);
+const UNIT_WIDTH: f32 = space(20);
 const COLUMNS: [TableColumn<'_>; 7] = [
     TableColumn::text("column").width(ColumnWidth::Rest),
     TableColumn::text("meaning").width(ColumnWidth::Points(MEANING_WIDTH)),
@@ -32,8 +35,6 @@ const COLUMNS: [TableColumn<'_>; 7] = [
     TableColumn::figure("missing").width(ColumnWidth::Points(space(12))),
     TableColumn::text("remarks").width(ColumnWidth::Rest),
 ];
-/// Meanings of all columns of a file or a variable.
-const OF_ALL: [Meaning; 3] = [Meaning::Input, Meaning::Target, Meaning::Unused];
 
 /// Where a row of the table leaves a change made by the user.
 type Changed = Cell<Option<Box<dyn FnOnce(&mut Import)>>>;
@@ -82,41 +83,48 @@ fn lines_of(file: &InspectedFile) -> impl Iterator<Item = Line<'_>> {
         .chain(left_out.map(Line::Variable))
 }
 
-/// The heading of a file or a variable, with its size and a choice for all of its columns.
+/// The heading of a file or a variable, with its size.
 fn heading_row<'a>(
     of: &'a InspectedFile,
     (file, line): (usize, Line<'a>),
     palette: Palette,
     changed: &'a Changed,
 ) -> TableRow<'a> {
-    let (name, whole, size, columns) = match line {
-        Line::Variable(Variable { name, shape, columns }) => (name.clone(), "variable", shape.clone(), columns.clone()),
-        _ => (
-            file_name(&of.path),
-            "all columns of",
-            counted(of.rows, "row"),
-            0..of.meanings.len(),
-        ),
+    let (name, size, columns) = match line {
+        Line::Variable(Variable { name, shape, columns }) => (name.clone(), shape.clone(), columns.clone()),
+        _ => (file_name(&of.path), counted(of.rows, "row"), 0..of.meanings.len()),
     };
-    let (is_left_out, is_file) = (columns.is_empty(), matches!(line, Line::File));
-    let colour = if is_left_out { palette.dim } else { palette.text };
-    let name_cell = TableCell::new(name.clone()).colour(colour).strong(is_file);
-    let controls = move |ui: &mut Ui| {
-        if is_left_out {
+    let mut cells = if columns.is_empty() {
+        let name_cell = TableCell::new(name.clone()).colour(palette.dim);
+        let controls = move |ui: &mut Ui| {
             let button = ui.small_button("Use its rows").on_hover_text(LEFT_OUT);
             button.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Use the rows of {name}")));
             if button.clicked() {
                 changed.set(Some(Box::new(move |import| import.wanted = Some((file, name)))));
             }
-        } else if let Some(meaning) = meaning_ui(ui, &format!("{whole} {name}"), &OF_ALL, None) {
-            let change = move |import: &mut Import| import.set_meanings(file, columns, meaning);
-            changed.set(Some(Box::new(change)));
-        }
+        };
+        vec![name_cell, TableCell::controls(controls)]
+    } else {
+        let text = RichText::new(&name).font(semibold(type_size().note));
+        let name_cell = move |ui: &mut Ui| {
+            if let Some(held) = name_ui(ui, &format!("all of {name}"), text, false) {
+                changed.set(Some(Box::new(move |import| import.select_all(file, columns, held))));
+            }
+        };
+        vec![TableCell::controls(name_cell), TableCell::default()]
     };
-    let mut cells = vec![name_cell, TableCell::controls(controls)];
     cells.extend((0..4).map(|_| TableCell::default()));
     cells.push(TableCell::new(size).colour(palette.dim));
     TableRow::new(cells)
+}
+
+/// The name of a column, or of all of a file or variable, which a click selects with the keys held.
+fn name_ui(ui: &mut Ui, name: &str, text: RichText, is_selected: bool) -> Option<Modifiers> {
+    let button = ui.add(Button::selectable(is_selected, text).truncate());
+    let label = format!("Select {name}");
+    button.widget_info(|| WidgetInfo::selected(Role::Button, true, is_selected, &label));
+    let is_clicked = button.on_hover_text(&label).clicked();
+    is_clicked.then(|| ui.input(|input| input.modifiers))
 }
 
 const LEFT_OUT: &str = "Left out, because its rows are not the samples. Makes its rows the samples.";
@@ -138,10 +146,16 @@ fn column_row<'a>(
     let name = inspected.full_name(column);
     let names = [name.clone(), format!("Unit of {name}"), format!("Histogram of {name}")];
     let [of_meaning, of_unit, of_histogram] = names;
+    let (of_name, is_selected) = (name.clone(), import.selected.contains(&name));
+    let name_cell = move |ui: &mut Ui| {
+        let text = RichText::new(&of_name).size(type_size().note).color(colour);
+        if let Some(held) = name_ui(ui, &of_name, text, is_selected) {
+            changed.set(Some(Box::new(move |import| import.select(of_name, held))));
+        }
+    };
     let meaning_cell = move |ui: &mut Ui| {
-        if let Some(picked) = meaning_ui(ui, &of_meaning, Meaning::ALL, Some(meaning)) {
-            let change = move |import: &mut Import| import.set_meanings(file, column..column + 1, picked);
-            changed.set(Some(Box::new(change)));
+        if let Some(picked) = meaning_ui(ui, format!("Meaning of {of_meaning}"), meaning) {
+            changed.set(Some(Box::new(move |import| import.set_meaning((file, column), picked))));
         }
     };
     let unit_cell = move |ui: &mut Ui| {
@@ -169,7 +183,7 @@ fn column_row<'a>(
     let is_bad = remark.is_some() && !is_unused;
     let remark_colour = if is_bad { palette.warning } else { palette.dim };
     let row = TableRow::new([
-        TableCell::new(name.clone()).colour(colour),
+        TableCell::controls(name_cell),
         TableCell::controls(meaning_cell),
         TableCell::controls(unit_cell),
         TableCell::controls(histogram_cell),
@@ -180,25 +194,23 @@ fn column_row<'a>(
     row.named(name)
 }
 
-/// A choice of the meaning `of` something; of several columns if none is `shown`. Returns the one newly picked.
-fn meaning_ui(ui: &mut Ui, of: &str, offered: &[Meaning], shown: Option<Meaning>) -> Option<Meaning> {
-    let names = Vec::from_iter(offered.iter().map(Meaning::to_string));
-    let options = offered.iter().zip(&names);
-    let options = options.map(|(&option, name)| (Some(option), name.as_str(), explanation(option)));
-    let all = shown.is_none().then_some((None, "set all…", ""));
-    let options = Vec::from_iter(all.into_iter().chain(options));
-    let (label, mut picked) = (format!("Meaning of {of}"), None);
+/// The choice of a meaning. Returns the one newly picked.
+fn meaning_ui(ui: &mut Ui, label: String, shown: Meaning) -> Option<Meaning> {
+    let names = Vec::from_iter(Meaning::ALL.iter().map(Meaning::to_string));
+    let options = Meaning::ALL.iter().zip(&names);
+    let options = Vec::from_iter(options.map(|(&option, name)| (option, name.as_str(), explanation(option))));
+    let mut picked = None;
     let button = combo_ui(ui, &label, MEANING_WIDTH, &options, shown, &mut picked);
     ui.ctx().accesskit_node_builder(button.id, |node| node.set_label(label));
-    picked.flatten()
+    picked
 }
 
 fn explanation(meaning: Meaning) -> &'static str {
     match meaning {
         Meaning::Input => "Reading of the sensor: an input of the network.",
-        Meaning::Target => "Predicted by the network from the inputs.",
+        Meaning::Target => "Decoded by the network from the inputs.",
         Meaning::Time => "Time of the row, by which files are joined and samples are put in order.",
-        Meaning::Group => "Rows of equal value, such as one press or one session, stay together in one set.",
+        Meaning::Group => "Samples of equal value, such as one press or one session, stay together in one set.",
         Meaning::RowWire => "Number of the row-wire that was read, from 1.",
         Meaning::Unused => "Not used.",
     }

@@ -9,12 +9,13 @@ use std::{
 
 use super::{
     files_section::FILES,
+    fixes::Fix,
     import::{Import, file_name},
     opening::{Opened, Reopened, open_files, reopen, write_sample},
     reading::Reading,
 };
 use crate::window::{
-    job::Wake,
+    job::Jobs,
     shared::{Effect, FileInUse, FileTask, Matter, Notice, RecordingDraft, RunsRequest, Shared, SourceKind},
     training_worker::RunId,
 };
@@ -39,6 +40,10 @@ pub struct RecordingEditor {
     /// Names of files that have changed since the run with this import.
     pub(super) changed: Vec<String>,
     pub(super) reading: Reading,
+    /// Problems of the import that was reported, the most urgent first.
+    pub fixes: Vec<Fix>,
+    /// What was open, missing and changed before all files were closed.
+    pub(super) cleared: Option<Cleared>,
     /// Texts in the fields of options that are not in the plan, by the names of the options, with the reason if they were refused.
     pub(super) typed: BTreeMap<&'static str, (String, Option<String>)>,
     /// The run in whose place the user is viewing the columns.
@@ -46,6 +51,9 @@ pub struct RecordingEditor {
     /// The file asked for last, and where its path arrives.
     asked: Option<(Use, Receiver<PathBuf>)>,
 }
+
+/// The import or the plan with missing files, and the names of changed files.
+type Cleared = (Option<Import>, Option<Box<Reopened>>, Vec<String>);
 
 /// Use of a file that the user is asked for.
 #[derive(Clone, Debug)]
@@ -59,13 +67,15 @@ pub(super) enum Use {
 }
 
 impl RecordingEditor {
-    /// Nothing open yet. `wake` is called when there are events.
-    pub fn new(wake: &Wake) -> Self {
+    /// Nothing open yet.
+    pub fn new(jobs: &Jobs) -> Self {
         Self {
             import: None,
             missing: None,
             changed: Vec::new(),
-            reading: Reading::new(Arc::clone(wake)),
+            reading: Reading::new(jobs),
+            fixes: Vec::new(),
+            cleared: None,
             typed: BTreeMap::new(),
             hidden: None,
             asked: None,
@@ -141,14 +151,27 @@ impl RecordingEditor {
             let mut paths = import.paths();
             paths.retain(|other| other != path);
             match paths.is_empty() {
-                true => self.close_all(),
+                true => self.clear(),
                 false => self.open_files(Vec::new(), paths),
             }
         }
     }
 
-    /// Closes all files.
-    pub(super) fn close_all(&mut self) {
+    /// Closes all files, and keeps what they were for [`Self::undo_clear`].
+    pub(super) fn clear(&mut self) {
+        let changed = std::mem::take(&mut self.changed);
+        self.cleared = Some((self.import.take(), self.missing.take(), changed));
+        self.close_all();
+    }
+
+    /// Brings back the files that [`Self::clear`] has closed.
+    pub(super) fn undo_clear(&mut self) {
+        if let Some(cleared) = self.cleared.take() {
+            (self.import, self.missing, self.changed) = cleared;
+        }
+    }
+
+    fn close_all(&mut self) {
         self.reading.cancel();
         (self.import, self.missing) = (None, None);
         self.changed.clear();
@@ -216,6 +239,8 @@ impl RecordingEditor {
             _ => false,
         };
         if !self.reading.is_reopening() && !is_reported {
+            let import = self.import.as_ref().filter(|_| plan.is_ok());
+            self.fixes = import.map(Fix::all).unwrap_or_default();
             effects.push(Effect::Import(plan));
         }
     }

@@ -5,9 +5,9 @@ use std::{iter::once, path::PathBuf};
 use decoupler_core::text::counted;
 use decoupler_files::{
     export::RecipeFile,
-    import::{FileSet, Plan},
+    import::{FileSet, Format, Plan},
 };
-use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role, vec2};
 
 use super::{
     editor::{RecordingEditor, Use},
@@ -15,7 +15,8 @@ use super::{
     reading::State,
 };
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Shared, file_stem, sentence},
+    shared::{Command, Effect, FileTask, FileWords, Shared, file_stem, sentence},
+    theme::space,
     widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
 };
 
@@ -25,25 +26,22 @@ pub(super) const FILES: FileWords = FileWords {
     description: "A table of readings and targets (CSV or other text, Excel, .npy, .npz, .mat), a recipe, a network or a \
                   checkpoint. A table with the header target,x,y says where each target lies on the skin, in millimetres: \
                   then surfaces are shown.",
-    extensions: &[
-        "csv",
-        "txt",
-        "tsv",
-        "dat",
-        "npy",
-        "npz",
-        "mat",
-        "xlsx",
-        "ods",
-        "json",
-        "checkpoint",
-    ],
+    extensions: &{
+        let mut all = ["json"; Format::EXTENSIONS.len() + 2];
+        all.split_at_mut(Format::EXTENSIONS.len())
+            .0
+            .copy_from_slice(&Format::EXTENSIONS);
+        all[Format::EXTENSIONS.len() + 1] = "checkpoint";
+        all
+    },
 };
 
 impl RecordingEditor {
     /// Shows the files of the recording, and opens and closes them.
     pub fn files_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         section_heading_ui(ui, "Files");
+        // Above the list, which grows and shrinks.
+        self.buttons_ui(ui, effects);
         self.missing_ui(ui, effects);
         if let Some(path) = self.import.as_ref().and_then(|import| open_files_ui(ui, import)) {
             self.close(&path);
@@ -59,7 +57,6 @@ impl RecordingEditor {
                 progress_bar_ui(ui, "Reading", share, &format!("{:.0} %", 100.0 * share));
             }
         }
-        self.buttons_ui(ui, effects);
         if self.is_empty() {
             let button = ui.add(ghost_button("Open the sample recording"));
             let hint = "Simulated readings of a soft skin with the force on it and its position: a recording for \
@@ -115,8 +112,9 @@ impl RecordingEditor {
             } else {
                 "Open file…"
             };
-            if ui.add(ghost_button(text)).on_hover_text(FILES.description).clicked() {
-                effects.push(Effect::ChooseFile(self.open_task()));
+            let open = ghost_button(text).min_size(vec2(space(22), space(7)));
+            if ui.add(open).on_hover_text(FILES.description).clicked() {
+                effects.push(Effect::Do(Command::OpenFiles));
             }
             if self.reading.is_opening() {
                 if ui.add(ghost_button("Cancel")).clicked() {
@@ -124,11 +122,16 @@ impl RecordingEditor {
                 }
             } else if !self.is_empty() {
                 let clear = ui.add(ghost_button("Clear"));
-                if clear
-                    .on_hover_text("Closes all files. Undo opens them again.")
+                if clear.on_hover_text("Closes all files, which can be undone.").clicked() {
+                    self.clear();
+                }
+            } else if self.cleared.is_some() {
+                let undo = ui.add(ghost_button("Undo: Clear"));
+                if undo
+                    .on_hover_text("Brings back the files and the meanings of their columns.")
                     .clicked()
                 {
-                    self.close_all();
+                    self.undo_clear();
                 }
             }
         });

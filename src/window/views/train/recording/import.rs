@@ -10,6 +10,7 @@ use std::{
 
 use decoupler_core::dataset::SplitBy;
 use decoupler_files::import::{FileSet, Format, InspectedFile, Meaning, Plan, Recipe};
+use eframe::egui::Modifiers;
 
 /// A column by its file and its name there, which do not change when another file becomes the first.
 type ColumnKey = (PathBuf, String);
@@ -25,6 +26,9 @@ pub(super) struct Import {
     chosen: BTreeMap<ColumnKey, Meaning>,
     /// File and name of a variable whose rows are to be the samples once the files are read again.
     pub(super) wanted: Option<(usize, String)>,
+    /// Full names of the columns selected in the table, and of the one clicked last without Shift.
+    pub(super) selected: BTreeSet<String>,
+    anchor: Option<String>,
 }
 
 impl Import {
@@ -40,11 +44,11 @@ impl Import {
     /// The import of a recipe: nothing in it is a guess.
     pub(super) fn of_recipe(plan: Plan, files: Vec<InspectedFile>) -> Self {
         let mut import = Self::suggested(plan, files);
-        for file in &import.files {
-            for (column, meaning) in file.meanings.iter().enumerate() {
-                import.chosen.insert(key(file, column), *meaning);
-            }
-        }
+        let given = import.columns().map(|(file, column)| {
+            let file = &import.files[file];
+            (key(file, column), file.meanings[column])
+        });
+        import.chosen = given.collect();
         import
     }
 
@@ -98,12 +102,10 @@ impl Import {
         self.plan = Arc::new(older.merged(Arc::unwrap_or_clone(self.plan)));
         self.chosen = older.chosen;
         let mut found = BTreeSet::new();
-        for file in 0..self.files.len() {
-            found.extend(names(&self.files[file], |_| true));
-            for column in 0..self.files[file].columns.len() {
-                if let Some(&meaning) = self.chosen.get(&key(&self.files[file], column)) {
-                    self.give(file, column, meaning);
-                }
+        for (file, column) in Vec::from_iter(self.columns()) {
+            found.insert(self.files[file].full_name(column));
+            if let Some(&meaning) = self.chosen.get(&key(&self.files[file], column)) {
+                self.give(file, column, meaning);
             }
         }
         self.edit().import.units.retain(|name, _| found.contains(name));
@@ -152,20 +154,60 @@ impl Import {
         Arc::make_mut(&mut self.plan)
     }
 
-    /// Gives these columns of a file a meaning; if only one column can have it, the previous one loses it. Several columns get
-    /// it only if they can be used and have no special meaning.
-    pub(super) fn set_meanings(&mut self, file: usize, columns: Range<usize>, meaning: Meaning) {
+    /// Gives a column a meaning, and with it all that are selected with it; if only one column can have the meaning, only this
+    /// one gets it, and the previous one loses it.
+    pub(super) fn set_meaning(&mut self, one: (usize, usize), meaning: Meaning) {
         let had_groups = self.plan.import.has_groups();
-        let is_single = columns.len() == 1;
-        for column in columns {
-            let (summary, before) = (&self.files[file].columns[column], self.files[file].meanings[column]);
-            let may_be_used = summary.min.is_some() && summary.texts == 0 && !summary.is_constant;
-            let is_plain = [Meaning::Input, Meaning::Target, Meaning::Unused].contains(&before);
-            if is_single || (is_plain && (may_be_used || meaning == Meaning::Unused)) {
-                self.give(file, column, meaning);
-            }
+        let name = |(file, column): (usize, usize)| self.files[file].full_name(column);
+        let is_for_all = is_plain(meaning) && self.selected.contains(&name(one));
+        let columns = self.columns();
+        let given = columns.filter(|&of| of == one || (is_for_all && self.selected.contains(&name(of))));
+        for (file, column) in Vec::from_iter(given) {
+            self.give(file, column, meaning);
         }
         self.write_meanings(had_groups);
+    }
+
+    /// Selects a column alone, or no longer; with Ctrl it leaves the others selected, with Shift it selects those up to the one
+    /// before.
+    pub(super) fn select(&mut self, name: String, held: Modifiers) {
+        let all = Vec::from_iter(self.files.iter().flat_map(|file| names(file, |_| true)));
+        let place = |of: &String| all.iter().position(|other| other == of);
+        let before = self.anchor.as_ref().filter(|_| held.shift).and_then(place);
+        let was_selected = self.selected.contains(&name);
+        if !held.command {
+            self.selected.clear();
+        }
+        if let Some((from, to)) = before.zip(place(&name)) {
+            let range = all[from.min(to)..=from.max(to)].iter();
+            return self.selected.extend(range.cloned());
+        }
+        self.anchor = Some(name.clone());
+        match was_selected {
+            true => drop(self.selected.remove(&name)),
+            false => drop(self.selected.insert(name)),
+        }
+    }
+
+    /// Selects those of these columns of a file that can be used and have no special meaning; with Ctrl it leaves the others
+    /// selected.
+    pub(super) fn select_all(&mut self, file: usize, columns: Range<usize>, held: Modifiers) {
+        if !held.command {
+            self.selected.clear();
+        }
+        let file = &self.files[file];
+        let can_be_used = |column: &usize| {
+            let summary = &file.columns[*column];
+            is_plain(file.meanings[*column]) && summary.min.is_some() && summary.texts == 0 && !summary.is_constant
+        };
+        let usable = columns.filter(can_be_used);
+        self.selected.extend(usable.map(|column| file.full_name(column)));
+    }
+
+    /// All columns, each after the number of its file.
+    pub(super) fn columns(&self) -> impl Iterator<Item = (usize, usize)> {
+        let files = self.files.iter().enumerate();
+        files.flat_map(|(file, of)| (0..of.columns.len()).map(move |column| (file, column)))
     }
 
     fn give(&mut self, file: usize, column: usize, meaning: Meaning) {
@@ -257,6 +299,11 @@ impl Import {
         let lacking = needed.into_iter().find(|(columns, _)| columns.is_empty());
         lacking.map(|(_, what)| format!("No column is {what}: choose one in the table of columns."))
     }
+}
+
+/// Returns true for a meaning that any number of columns can have.
+fn is_plain(meaning: Meaning) -> bool {
+    matches!(meaning, Meaning::Input | Meaning::Target | Meaning::Unused)
 }
 
 fn key(file: &InspectedFile, column: usize) -> ColumnKey {

@@ -228,7 +228,8 @@ impl RecordingEditor {
         let Some(import) = &self.import else { return };
         let (plan, formats) = (Arc::clone(&import.plan), import.text_formats());
         let is_joined = !plan.import.join.is_empty();
-        fold_ui(ui, "Samples", &samples_summary(import, settings), |ui| {
+        let samples = samples_summary(import, self.held_out(), settings);
+        fold_ui(ui, "Samples", &samples, |ui| {
             self.split_ui(ui, settings.validation_fraction());
             let hint = "A recording with the same columns; all its samples are test samples. Files for the test that are \
                         joined have “test” in their names: open all of them at once.";
@@ -343,9 +344,15 @@ impl RecordingEditor {
         }
     }
 
+    /// Returns the number of test samples and of all samples, once they are known.
+    fn held_out(&self) -> Option<(usize, usize)> {
+        let samples = self.reading.checked()?.samples;
+        Some((samples[2], samples.iter().sum::<usize>().max(1)))
+    }
+
     /// The division of the samples.
     fn split_ui(&mut self, ui: &mut Ui, usual_validation: f64) {
-        let samples = self.reading.checked().map(|checked| checked.samples);
+        let held_out = self.held_out();
         let Some(import) = &mut self.import else { return };
         let mut division = import.plan.division;
         let has_group = import.plan.import.has_groups();
@@ -361,12 +368,9 @@ impl RecordingEditor {
             let hint = "Share of the samples held out for testing.";
             percent_ui(ui, "Test share", hint, &mut division.test_fraction, 0.2, 1.0..=90.0);
             dim_ui(ui, bias(division.by));
-            if let (SplitBy::Group, Some(samples)) = (division.by, samples) {
-                let (held_out, all) = (samples[2], samples.iter().sum::<usize>().max(1));
-                dim_ui(
-                    ui,
-                    &format!("Held out: {held_out} of {all} samples ({} %).", 100 * held_out / all),
-                );
+            if let (SplitBy::Group, Some((held_out, all))) = (division.by, held_out) {
+                let percent = 100 * held_out / all;
+                dim_ui(ui, &format!("Held out: {held_out} of {all} samples ({percent} %)."));
             }
         }
         let hint = "Share of the other samples that selects the best weights and ends the training. Bayesian \
@@ -382,9 +386,13 @@ impl RecordingEditor {
     }
 }
 
-fn samples_summary(import: &Import, settings: &RunSettings) -> String {
+fn samples_summary(import: &Import, held_out: Option<(usize, usize)>, settings: &RunSettings) -> String {
     let division = import.plan.division;
-    let share = input_text((1000.0 * division.test_fraction).round() / 10.0);
+    let share = match held_out {
+        // Whole groups are another share than the one asked for.
+        Some((held_out, all)) if division.by == SplitBy::Group => (100 * held_out / all).to_string(),
+        _ => input_text((1000.0 * division.test_fraction).round() / 10.0),
+    };
     let split = match &import.plan.test {
         Some(test) => format!("test: {}", file_name(&test.data)),
         None => format!("{}, {share} % test", division.by),
@@ -398,7 +406,7 @@ pub(in crate::window::views::train) fn bias(by: SplitBy) -> &'static str {
         SplitBy::Time => "The last part of the recording is held out for testing.",
         SplitBy::Group => "Whole groups are held out for testing: no press or session is in two sets.",
         SplitBy::Random => {
-            "A random split is optimistic when neighbouring rows are similar. Compare with a split by group, or by time \
+            "A random split is optimistic when neighbouring samples are similar. Compare with a split by group, or by time \
              if there are no groups."
         }
     }

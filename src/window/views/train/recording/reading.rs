@@ -9,7 +9,7 @@ use super::{
     checking::{Checked, check},
     opening::Opened,
 };
-use crate::window::job::{Background, JobError, Report, Wake};
+use crate::window::job::{Background, JobError, Jobs, Report};
 
 /// The task under way, or the outcome of the last one.
 #[derive(Debug)]
@@ -40,10 +40,10 @@ pub(super) enum State {
 }
 
 impl Reading {
-    /// No work yet. `wake` is called when there are events.
-    pub(super) fn new(wake: Wake) -> Self {
+    /// No work yet.
+    pub(super) fn new(jobs: &Jobs) -> Self {
         Self {
-            job: Background::new("recording", wake),
+            job: Background::new("reading of a recording", jobs),
             asked: None,
             state: State::Idle,
         }

@@ -4,7 +4,8 @@ use eframe::egui::{RichText, Sense, Ui};
 
 use super::{checking::Checked, editor::RecordingEditor};
 use crate::window::{
-    shared::{Effect, Shared, sentence},
+    glossary,
+    shared::{Command, Effect, Shared, sentence},
     theme::{semibold, space, type_size},
     widgets::{card_ui, dim_ui, invitation_ui, note_ui, scrolled_ui, section_heading_ui},
 };
@@ -12,6 +13,9 @@ use crate::window::{
 const INVITATION: &str = "Readings of a sensor with the targets measured at the same time, such as forces: one file, several that \
                           share a time, or several with the same columns. CSV and other text, Excel, .npy, .npz and .mat. \
                           The meaning of each column is suggested by its name and numbers, and can be changed.";
+
+const SELECTING: &str = "Click a name to select a column, or all of a file; with Shift a range, with Ctrl several. A meaning chosen in one \
+                         is given to all.";
 
 impl RecordingEditor {
     /// Shows the columns of the files with the samples below, or an invitation to open files.
@@ -23,7 +27,7 @@ impl RecordingEditor {
             card_ui(ui, whole, |ui| {
                 ui.label(RichText::new("Drop recordings here").font(semibold(type_size().title)));
                 if invitation_ui(ui, INVITATION, "Open files…", true) {
-                    effects.push(Effect::ChooseFile(self.open_task()));
+                    effects.push(Effect::Do(Command::OpenFiles));
                 }
             });
         } else {
@@ -31,6 +35,7 @@ impl RecordingEditor {
             let (columns, samples) = whole.split_top_bottom_at_y(whole.bottom() - height);
             card_ui(ui, columns.with_max_y(columns.bottom() - space(2)), |ui| {
                 section_heading_ui(ui, "Columns");
+                dim_ui(ui, SELECTING);
                 self.columns_table_ui(ui, shared.phase.is_busy());
             });
             card_ui(ui, samples, |ui| {
@@ -47,18 +52,15 @@ impl RecordingEditor {
 }
 
 fn checked_ui(ui: &mut Ui, checked: &Checked) {
-    const SETS: [(&str, &str); 3] = [
-        ("Training", "Samples to which the network is fitted."),
-        (
-            "Validation",
-            "Samples that select the best weights and end the training.",
-        ),
-        ("Test", "Samples on which all errors are measured."),
+    const SETS: [(&str, glossary::Term); 3] = [
+        ("Training", glossary::TRAINING_SET),
+        ("Validation", glossary::VALIDATION_SET),
+        ("Test", glossary::TEST_SET),
     ];
     ui.horizontal(|ui| {
         for ((name, meaning), count) in SETS.into_iter().zip(checked.samples) {
             if (name, count) != ("Validation", 0) {
-                ui.label(format!("{name}: {count}")).on_hover_text(meaning);
+                ui.label(format!("{name}: {count}")).on_hover_text(meaning.hint);
                 ui.add_space(space(3));
             }
         }

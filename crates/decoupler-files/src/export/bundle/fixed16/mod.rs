@@ -76,7 +76,7 @@ impl FixedProgram {
         let (exported, meaning, scales) = (&contents.exported, &contents.meaning, &contents.scales);
         let (is_relative, reference, layers) = chain(exported)?;
         let no_range = "fixed16 needs the range of the readings in training, which the network file does not have: train again, \
-                        or give --precision f32";
+                        or choose precision f32";
         let limits = limits.ok_or_else(|| BundleError::Unsuitable(no_range.to_owned()))?;
         let cure = meaning.smaller_weights();
         let rows = exported.program.rows();
@@ -110,7 +110,7 @@ impl FixedProgram {
             let bounds = fixed.push_row(tables(reference, row), &Vec::from_iter(layers), limits.at(row));
             let bounds = bounds.map_err(|what| {
                 BundleError::Unsuitable(format!(
-                    "fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or give --precision f32"
+                    "fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or choose precision f32"
                 ))
             })?;
             for (target, (bound, of_row)) in fixed.bounds.iter_mut().zip(bounds).enumerate() {
@@ -123,7 +123,7 @@ impl FixedProgram {
         }
         Err(BundleError::Unsuitable(format!(
             "in fixed point the error is only known to be below {bound:.3} times {}: {cure} (the decoder amplifies differences of \
-             its readings too much), or give --precision f32",
+             its readings too much), or choose precision f32",
             meaning.scale()
         )))
     }
@@ -296,7 +296,7 @@ fn chain(exported: &ExportedProgram) -> Result<(bool, NodeId, Vec<[NodeId; 2]>),
         Operation::Map(..) => "logarithms",
         _ => "history of readings",
     };
-    let message = format!("fixed16 has no {step}: give --precision f64 or f32");
+    let message = format!("fixed16 has no {step}: choose precision f64 or f32");
     Err(BundleError::Unsuitable(message))
 }
 

@@ -29,8 +29,8 @@ impl Units {
             let fits = |&decimals: &i32| largest_ohm * ten_to(decimals) <= LARGEST_READING;
             let decimals = [9, 6, 3, 0].into_iter().find(fits).ok_or_else(|| {
                 BundleError::Unsuitable(format!(
-                    "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {largest_ohm:.1e} ohm: give \
-                     --precision f32"
+                    "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {largest_ohm:.1e} ohm: choose \
+                     precision f32"
                 ))
             });
             vec![decimals?; channels.len()]
