@@ -68,7 +68,7 @@ fn chosen_settings_are_disabled_show_what_was_chosen_and_are_kept_when_the_choic
         driver.state().setup().ok().as_ref() == Some(&setup)
     });
     driver.settle();
-    for name in ["Hidden nodes", "Method", "Epochs", "Restarts", "Combine restarts"] {
+    for name in ["Hidden nodes", "Method", "Epochs", "Restarts"] {
         assert!(driver.is_enabled(name), "{name}");
     }
     assert_eq!(driver.state().settings(), chosen);

@@ -403,7 +403,7 @@ fn a_training_has_one_time_in_every_view() {
         let texts = driver.texts();
         let place = texts.iter().position(|text| text == "Training time").unwrap();
         let time = &texts[place + 1];
-        assert!(driver.has(&format!("{time} in total")), "the status line: {texts:#?}");
+        driver.wait("the status line", |driver| driver.has(&format!("{time} in total")));
         let report = folder.path().join("report.html");
         driver.save("Report, HTML", &report);
         driver.click("Dismiss");

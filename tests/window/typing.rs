@@ -144,6 +144,7 @@ fn a_double_click_sets_sliders_and_the_depth_to_their_defaults() {
     double_click_slider(&mut driver, "Epoch of the displayed network");
     assert_eq!(driver.views().train.scrub.epoch(), None, "the latest");
 
+    driver.act("Press the middle of the surface");
     driver.enter("Depth", "0.2");
     assert_eq!(driver.views().train.press.finger.depth_share, 0.2);
     let at = driver.get("Depth").rect().center();

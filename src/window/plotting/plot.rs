@@ -227,6 +227,9 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransf
     if track.is_some() {
         // The names are next to the plots, and their frames are below each other.
         y_hints = y_hints.label("").min_thickness(NUMBERS);
+    } else if plot.y.scale == Scale::Logarithmic {
+        // Its numbers are the longest, and change with every zoom.
+        y_hints = y_hints.min_thickness(NUMBERS);
     }
     // A menu over the plot is not covered by tooltips.
     let is_covered = Popup::is_any_open(ui.ctx());

@@ -218,7 +218,7 @@ fn logarithmic_ticks(range: &RangeInclusive<f64>, apart: f64, least: f64) -> Tic
 fn power_text(log: f64, range: &RangeInclusive<f64>) -> String {
     // Three digits distinguish any two ticks. The exponent is split off before 10 to its power overflows.
     let decade = (log + 1e-9).floor();
-    let is_plain = *range.start() > -4.5 && *range.end() < 5.5;
+    let is_plain = *range.start() > -3.2 && *range.end() < 5.5;
     let exponent = if is_plain { 0.0 } else { decade };
     let decimals = (2.0 + exponent - decade).max(0.0) as usize;
     let number = format!("{:.decimals$}", 10.0_f64.powf(log - exponent));
@@ -293,8 +293,8 @@ mod tests {
     fn ticks_of_a_logarithmic_axis_are_in_view_and_read_as_numbers() {
         let axis = PlotAxis::logarithmic("");
         let texts = |low, high, points| texts(&axis, [low, high], points, 16.0);
-        assert_eq!(texts(-4.2, 0.1, 150.0), ["0.0001", "0.001", "0.01", "0.1", "1"]);
-        assert_eq!(texts(-5.2, 0.1, 150.0), ["1e−5", "1e−4", "1e−3", "1e−2", "1e−1", "1e0"]);
+        assert_eq!(texts(-3.1, 0.1, 150.0), ["0.001", "0.01", "0.1", "1"]);
+        assert_eq!(texts(-4.2, 0.1, 150.0), ["1e−4", "1e−3", "1e−2", "1e−1", "1e0"]);
         assert_eq!(texts(-1.1, 0.2, 150.0), ["0.1", "0.2", "0.5", "1"]);
         assert_eq!(texts(-1.1, 0.2, 60.0), ["0.1", "1"]);
         assert_eq!(texts(-0.73, -0.69, 150.0), ["0.19", "0.195", "0.2"]);

@@ -437,9 +437,9 @@ pub fn charts_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, has_re
     let (rare, usual): (Vec<&Chart>, Vec<&Chart>) = offered.iter().copied().partition(|chart| chart.is_rare);
     let tabs = Vec::from_iter(usual.iter().map(|chart| (chart.name, chart.name)));
     let listed = Vec::from_iter(rare.iter().map(|chart| (chart.name, chart.name, "")));
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let mut picked = tabs_ui(ui, "Charts", &tabs, chart.name);
-        let list = combo_ui(ui, "More charts", space(27), &listed, chart.name, &mut picked);
+        let list = combo_ui(ui, "More charts", space(24), &listed, chart.name, &mut picked);
         ui.ctx()
             .accesskit_node_builder(list.id, |node| node.set_label("More charts"));
         view.tab = picked.unwrap_or(chart.name);
