@@ -454,6 +454,21 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
 }
 
 #[test]
+fn a_number_that_means_none_is_declared_missing_before_a_training() {
+    let mut text = "u,v,force (N)\n".to_owned();
+    for row in 0..80 {
+        let force = if row % 9 == 4 { -999 } else { row % 11 };
+        writeln!(text, "{}.5,{},{force}", row % 7, row % 5).unwrap();
+    }
+    let (mut driver, _path, _folder) = opened_text(&text);
+    driver.click_button("Treat −999 as missing");
+    driver.wait("the missing cells", |driver| driver.has("force, missing: 9"));
+    driver.wait("the samples", |driver| driver.says("Test: "));
+    driver.settle();
+    assert!(!driver.says("Treat −999 as missing") && driver.state().run.is_none());
+}
+
+#[test]
 fn a_random_split_is_reported_as_optimistic() {
     let (mut driver, _path, _folder) = opened(40);
     assert!(!driver.says("A random split is optimistic"));

@@ -306,7 +306,10 @@ fn verdict_ui(
             note_ui(ui, &sentence(&text));
             let mut is_clicked = |name: &str| ui.add(primary_button(name)).clicked();
             match offered {
-                Some(Offered::Fix(fix)) if is_clicked(&fix.button) => effects.extend(fix.effects(shared)),
+                Some(Offered::Fix(fix)) if is_clicked(&fix.button) => {
+                    effects.extend(fix.effects(shared));
+                    effects.push(Effect::Do(Command::Train));
+                }
                 Some(Offered::UseRidge) if is_clicked("Use ridge") => effects.push(Effect::UseRidge),
                 _ => {}
             }

@@ -6,7 +6,7 @@ use decoupler_core::dataset::SplitBy;
 use decoupler_files::import::{Plan, Setup, is_group_name};
 
 use super::{import::Import, options::bias};
-use crate::window::shared::{Command, Effect, Shared};
+use crate::window::shared::{Effect, Shared};
 
 /// A problem of a recording, and a change of its plan that fixes it.
 #[derive(Debug)]
@@ -18,14 +18,11 @@ pub struct Fix {
 }
 
 impl Fix {
-    /// Takes the changed plan, and trains again.
+    /// Takes the changed plan.
     pub fn effects(&self, shared: &Shared) -> Vec<Effect> {
         let setup = Setup::recording(shared.recording.settings, self.plan.clone());
-        vec![
-            Effect::TakeSetup(Box::new(setup)),
-            Effect::ChooseAutomatically(shared.recording.is_auto),
-            Effect::Do(Command::Train),
-        ]
+        let is_auto = shared.recording.is_auto;
+        vec![Effect::TakeSetup(Box::new(setup)), Effect::ChooseAutomatically(is_auto)]
     }
 
     /// Returns the problems of an import, the most urgent first.

@@ -7,7 +7,7 @@ use crate::window::{
     glossary,
     shared::{Command, Effect, Shared, sentence},
     theme::{semibold, space, type_size},
-    widgets::{card_ui, dim_ui, invitation_ui, note_ui, scrolled_ui, section_heading_ui},
+    widgets::{card_ui, dim_ui, ghost_button, invitation_ui, note_ui, scrolled_ui, section_heading_ui},
 };
 
 const INVITATION: &str = "Readings of a sensor with the targets measured at the same time, such as forces: one file, several that \
@@ -43,6 +43,12 @@ impl RecordingEditor {
                     section_heading_ui(ui, "Samples");
                     if let Some(checked) = self.reading.checked() {
                         checked_ui(ui, checked);
+                    }
+                    for fix in &self.fixes {
+                        let button = ui.add_enabled(!shared.phase.is_busy(), ghost_button(&fix.button));
+                        if button.on_hover_text(&fix.problem).clicked() {
+                            effects.extend(fix.effects(shared));
+                        }
                     }
                 });
             });
