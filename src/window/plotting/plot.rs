@@ -117,9 +117,6 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure) -> Vec<DrawnP
     let mut width = (whole.width() - (count - 1.0) * space(3)) / count;
     if are_notes_right {
         width = (width - NOTES_WIDTH).min(MAX_ASPECT * whole.height());
-    } else if is_square {
-        // Apart from the numbers at the axes.
-        width = width.min(whole.height() + space(3));
     }
     let height = (whole.height() - AXIS) / count;
     let slot = |index: usize| {
