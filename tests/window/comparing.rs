@@ -401,8 +401,8 @@ fn a_training_has_one_time_in_every_view() {
         driver.wait_for_kept_run();
         driver.details();
         let texts = driver.texts();
-        let place = texts.iter().position(|text| text == "Training time").unwrap();
-        let time = &texts[place + 1];
+        let mut after = texts.iter().skip_while(|text| *text != "Training time");
+        let time = after.find(|text| *text != "Training time").unwrap();
         driver.wait("the status line", |driver| driver.has(&format!("{time} in total")));
         let report = folder.path().join("report.html");
         driver.save("Report, HTML", &report);

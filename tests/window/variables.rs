@@ -98,7 +98,8 @@ fn variables_are_listed_with_their_shapes_and_chosen_by_name() {
         driver.assert_says(shape);
     }
     assert!(!driver.has("Meaning of gauge.c1"));
-    driver.mean("variable skin", "target");
+    driver.click("Select all of skin");
+    driver.mean("skin.c1", "target");
     driver.mean("push", "input");
     driver.settle();
     let import = plan(&driver).import;

@@ -244,7 +244,7 @@ fn range_text(min: f64, max: f64) -> String {
     let exact = [min, max].map(|end| tick_text(end, (max - min) / 100.0)).join(" – ");
     match ends {
         [end, _] if min == max => end,
-        _ if max - min >= 1e-6 && exact.chars().count() <= MAX_CHARACTERS => exact,
+        _ if (1e-6..=f64::MAX).contains(&(max - min)) && exact.chars().count() <= MAX_CHARACTERS => exact,
         [one, other] if one == other => format!("{one}, width {}", format_number(max - min).replace('-', "−")),
         ends => ends.join(" – "),
     }
