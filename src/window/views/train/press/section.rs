@@ -30,6 +30,10 @@ use crate::window::{
 /// The finger while it presses, and the answers of all decoders to it.
 pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     let Some(skin) = shared.skin() else { return };
+    // The surface says how to press, too: in a low window the error table comes first.
+    if press.answered.is_none() && !press.is_pressing() && ui.clip_rect().height() <= space(70) {
+        return;
+    }
     section_heading_ui(ui, "Press");
     if press.is_pressing() {
         finger_ui(ui, press, skin.stroke_mm);
@@ -48,13 +52,10 @@ pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
             dim_ui(ui, "Computing the readings…");
         }
         None => {
-            // The surface shows it too: in a low window the error table comes first.
-            if ui.clip_rect().height() > space(70) {
-                dim_ui(
-                    ui,
-                    "Press on the actual surface; the wheel sets the depth. Drag with the right button or Shift to turn it.",
-                );
-            }
+            dim_ui(
+                ui,
+                "Press on the actual surface; the wheel sets the depth. Drag with the right button or Shift to turn it.",
+            );
             return;
         }
     }
