@@ -366,7 +366,7 @@ impl Driver {
         self.harness.step();
     }
 
-    /// Shows a chart of the Train view: a tab, or one of the list beside the tabs.
+    /// Shows a chart of the Train view: a tab, or one of the list next to the tabs.
     #[track_caller]
     pub(crate) fn show_chart(&mut self, name: &str) {
         let tab = By::new().role(Role::Tab).label(name);

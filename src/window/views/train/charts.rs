@@ -29,7 +29,7 @@ pub(super) struct Chart {
     pub name: &'static str,
     /// What appears in it once a network is trained.
     hint: &'static str,
-    /// True if it is one of the list beside the tabs.
+    /// True if it is one of the list next to the tabs.
     is_rare: bool,
     /// Returns false while it has nothing to do with what is displayed.
     is_offered: fn(&Shared) -> bool,

@@ -157,7 +157,7 @@ impl RecordingEditor {
         }
     }
 
-    /// Closes all files, and keeps what they were for [`Self::undo_clear`].
+    /// Closes all files, and keeps their names and meanings for [`Self::undo_clear`].
     pub(super) fn clear(&mut self) {
         let changed = std::mem::take(&mut self.changed);
         self.cleared = Some((self.import.take(), self.missing.take(), changed));
