@@ -17,13 +17,13 @@ const ARRAY: &str =
 const RECORDING: &str = "--data data.csv --inputs t,u --targets d";
 const FRAMES: &str = "--data presses.csv --inputs r_1..r_6 --targets x_1..z_2 --row-wire row --group snapshot";
 
-/// The arguments for which `@array`, `@recording` and `@frames` stand.
+/// The arguments that replace `@array`, `@recording` and `@frames`.
 pub(crate) fn in_full(arguments: &str) -> String {
     let arguments = arguments.replace("@array", ARRAY).replace("@recording", RECORDING);
     arguments.replace("@frames", FRAMES)
 }
 
-/// Runs the program, which replaces files only if it is told so.
+/// Runs the program, which replaces files only with an option.
 fn run(arguments: &str, folder: &Path, input: &[u8]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
     command.args(in_full(arguments).split_whitespace()).current_dir(folder);

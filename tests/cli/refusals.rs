@@ -9,7 +9,7 @@ use crate::{
     terminal::decoupler,
 };
 
-/// Arguments that end with status 2, and words of the message.
+/// Arguments that end with status 2, and part of the message.
 const INVALID: &[&str] = &[
     "trian => 'train'",
     "train --sed 1 => --seed",
@@ -83,7 +83,7 @@ const INVALID: &[&str] = &[
     "reproduce --arrays 10x6 => not an array scale",
     "reproduce --seeds 0 => from 1",
     "reproduce --folds 11 --fold-unit snapshot => 11 folds of 10 snapshots",
-    // Options of a simulated sensor beside a recording, and of a recording without one.
+    // Options of a simulated sensor together with a recording, and of a recording without one.
     "train @recording --array 2x2_2x6 => --array: a recording (--data) has no array",
     "train @recording --noise 0.1 => --noise: a recording (--data) has its own noise",
     "train @recording --loading random => --loading: a recording (--data) has no scene",

@@ -40,7 +40,7 @@ pub enum JobError {
 }
 
 /// The jobs of the window that run now. Each is listed by its name; its events have a type of their own and go to the part of the
-/// window that started it, as one list of them all would hold values whose type is known only when they are taken out.
+/// window that started it, as one list of all events would hold values whose type is known only when they are taken out.
 #[derive(Clone)]
 pub struct Jobs {
     /// Called after each event.

@@ -29,7 +29,7 @@ pub(crate) fn settings(array: &str, hidden: usize, epochs: usize) -> RunSettings
     settings
 }
 
-/// A run after so many epochs, or at its end.
+/// A run after this many epochs, or at its end.
 pub(crate) fn stepped(settings: RunSettings, epochs: usize) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     for _ in 0..epochs {
