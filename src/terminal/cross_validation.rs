@@ -71,7 +71,7 @@ pub(super) fn optimism(recording: &Recording, settings: &RunSettings, by: SplitB
                 .collect()
         }
         Err(error) => vec![format!(
-            "a random split is optimistic when neighbouring rows are similar; by how much cannot be measured here: {error}"
+            "a random split is optimistic when neighbouring samples are similar; by how much cannot be measured here: {error}"
         )],
     }
 }

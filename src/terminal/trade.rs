@@ -329,7 +329,7 @@ struct PointTraining {
 
 /// Legend of the marks at the end of the lines of the table.
 const FRONTS: &str = "* no other decoder is both faster and more accurate; + no other is both trained faster and more accurate\n\
-                      Training time is the sum over all rows and starts.";
+                      Training time is the sum over all rows and restarts.";
 
 /// A limit, and the index of the best point within it; none if no point is.
 type Choice = (f64, Option<usize>);
@@ -340,7 +340,7 @@ impl RecordedSource {
         import_warnings(recordings).iter().for_each(warn);
         if plan.division.by == SplitBy::Random && recordings.test.is_none() {
             warn(
-                "random test samples are optimistic when neighbouring rows of a recording are similar; decoupler train \
+                "random test samples are optimistic when neighbouring samples of a recording are similar; decoupler train \
                  measures by how much, and --split group or time avoids it",
             );
         }

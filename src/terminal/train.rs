@@ -390,7 +390,7 @@ fn show(run: &Run, bar: &ProgressBar) {
     let ended = run.trainers().iter().filter(|trainer| trainer.stop_reason().is_some());
     let starts = match run.trainers().len() {
         1 => String::new(),
-        starts => format!(", {} of {starts} starts ended", ended.count()),
+        starts => format!(", {} of {starts} restarts ended", ended.count()),
     };
     bar.set_message(format!("mse {mse}{starts}"));
 }

@@ -79,7 +79,7 @@ pub(crate) fn show(driver: &mut Driver, view: &str) {
     }
     if view == "Compare" {
         driver.wait("the run", |driver| {
-            driver.says("Dashed: training") && !driver.says("being prepared")
+            driver.says("mse (scaled) against epoch") && !driver.says("being prepared")
         });
     }
     driver.settle();

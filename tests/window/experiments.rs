@@ -330,7 +330,11 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     driver.click_button("Study");
     driver.click("Sweep");
     driver.settle();
-    assert!(driver.says("samples"), "the recording has no number of samples to vary");
+    assert!(
+        driver.is_enabled("▶ Run"),
+        "a recording has no number of samples to vary: {:#?}",
+        driver.texts()
+    );
     driver.choose("Down", "Scaling");
     for scaling in ["Min-max", "Whitening"] {
         driver.click(scaling);

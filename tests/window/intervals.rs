@@ -24,11 +24,15 @@ pub(crate) fn noisy(rows: usize) -> String {
     text
 }
 
-/// Trains until the frame in which the calibration begins.
+/// Trains until the frame in which the calibration begins. It is begun again if it ended between two frames, which are far
+/// apart on a busy machine.
 pub(crate) fn train_to_calibration(driver: &mut Driver) {
     driver.click("▶ Train");
     while driver.state().phase != Phase::Calibrating {
         driver.wait_for_frame("the calibration");
+        if matches!(driver.state().phase, Phase::Ended(_)) {
+            driver.click("▶ Train");
+        }
     }
 }
 
@@ -80,18 +84,21 @@ fn pausing_after_the_last_epoch_keeps_the_intervals() {
 
 #[test]
 fn stopping_a_calibration_keeps_the_network_without_intervals() {
-    // Its five trainings take much longer than a frame, and on a busy machine too less than the minute above which none is
-    // begun.
+    // Its five trainings take much longer than most frames, and less than the minute above which none is begun.
     let (mut driver, _, _folder) = opened_text(&noisy(20_000));
     driver.limit_epochs("60");
-    train_to_calibration(&mut driver);
-    driver.assert_says("Calibrating the 90 % intervals");
-    // As if clicked, but in this frame: on a busy machine a frame takes long.
-    driver.window_mut().apply(Effect::Do(Command::StopTraining));
-    driver.wait_for_training();
-    driver.wait_for_kept_run();
-    assert!(!driver.says("Stopped at epoch"));
-    driver.details();
-    driver.assert_has("No 90 % intervals: interrupted.");
-    assert_eq!(driver.kept(0).intervals, None);
+    let is_interrupted = |trainings: usize| {
+        train_to_calibration(&mut driver);
+        // As if clicked, but in this frame.
+        driver.window_mut().apply(Effect::Do(Command::StopTraining));
+        driver.wait_for_training();
+        driver.wait("the kept run", |driver| driver.runs().len() == trainings);
+        assert!(!driver.says("Stopped at epoch"));
+        driver.details();
+        driver.has("No 90 % intervals: interrupted.")
+    };
+    // On a busy machine the frame may take longer than the calibration.
+    assert!((1..20).any(is_interrupted), "{:#?}", driver.texts());
+    let newest = driver.runs().len() - 1;
+    assert_eq!(driver.kept(newest).intervals, None);
 }

@@ -159,12 +159,13 @@ fn a_damaged_checkpoint_is_reported_and_can_be_discarded() {
 #[test]
 fn a_training_that_ended_without_its_intervals_gets_them_when_resumed() {
     let folder = tempfile::tempdir().unwrap();
-    // Its calibration takes much longer than a frame.
+    // Its five trainings take much longer than a frame, on a busy machine too, and less than the minute above which none is
+    // begun.
     let path = written(&folder, "press.csv", &noisy(20_000));
     let kept = folder.path().join("data");
     let mut driver = Driver::open_keeping_trainings(&kept);
     driver.open_recordings(&[&path]);
-    driver.limit_epochs("20");
+    driver.limit_epochs("100");
     train_to_calibration(&mut driver);
     kill(driver, &kept, 1);
     let mut driver = offered_in(&kept);

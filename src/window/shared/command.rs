@@ -226,8 +226,9 @@ impl<'a> Offers<'a> {
     pub fn offer_samples(&mut self, shown: usize, samples: usize) -> Option<usize> {
         let steps = [Command::PreviousSample, Command::NextSample].into_iter();
         let steps = steps.zip(neighbours(shown, samples));
-        let asked =
-            steps.filter(|(step, to)| self.offer_unless(step.clone(), to.is_none().then_some("It is the last one.")));
+        let asked = steps.filter(|(step, to)| {
+            self.offer_unless(step.clone(), to.is_none().then_some("There is none in this direction."))
+        });
         asked.last()?.1
     }
 

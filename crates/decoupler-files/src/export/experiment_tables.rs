@@ -87,11 +87,11 @@ impl ExperimentTable {
 }
 
 const NODES_NOTE: &str = "Median, minimum and maximum over seeds (and repeats). mean: always answering the training mean; \
-     linear: best affine map on resistance; epochs: mean of the starts; training time: of one training, on one thread.";
+     linear: best affine map on resistance; epochs: mean of the restarts; training time: of one training, on one thread.";
 
 const TARGETS_NOTE: &str = "Median, minimum and maximum over seeds. error: mean absolute error in percent of the range of \
      the target, averaged over the targets that vary, and R² likewise; mean: always answering the training mean; ridge: \
-     ridge regression; epochs: mean of the starts; training time: of one training, on one thread.";
+     ridge regression; epochs: mean of the restarts; training time: of one training, on one thread.";
 
 /// A figure of a cell: its name in tables for programs; where readers see it, the heading and kind of its column; its value.
 type CellFigure = (String, Option<(&'static str, ExperimentColumnKind)>, Cell);
@@ -238,10 +238,10 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     }
     said.push(counted(base.training.stopping.epochs, "epoch"));
     said.push(match base.starts {
-        1 => "one start".to_owned(),
+        1 => "one restart".to_owned(),
         starts => match base.combine {
-            Combination::Best => format!("best of {starts} starts by validation error"),
-            Combination::Mean => format!("mean of {starts} starts"),
+            Combination::Best => format!("best of {starts} restarts by validation error"),
+            Combination::Mean => format!("mean of {starts} restarts"),
         },
     });
     said.push(match experiment.seeds {

@@ -136,7 +136,14 @@ impl PlotAxis {
         }
         let least = apart.max(width / MAX_PARTS);
         match &self.scale {
-            Scale::Linear => Ticks::at_multiples(range, round_step(least)),
+            Scale::Linear => {
+                let (step, end) = (round_step(least), range.end().max(-range.start()));
+                let decade = 10_f64.powi(end.log10().floor() as i32);
+                let digit = (end / decade).floor() * decade;
+                // A zero alone gives no scale: then the largest number of one digit, if there is room.
+                let is_alone = *range.start() < 0.0 && *range.end() > 0.0 && end < step && digit > 0.8 * least;
+                Ticks::at_multiples(range, if is_alone { digit } else { step })
+            }
             Scale::Logarithmic => logarithmic_ticks(range, apart, least),
             Scale::Multiples(unit) => Ticks::at_multiples(range, unit * round_step(least / unit).max(1.0)),
             Scale::Hidden => Ticks::default(),
@@ -282,6 +289,8 @@ mod tests {
         let axis = PlotAxis::linear("");
         let texts = |low, high, points| texts(&axis, [low, high], points, 50.0);
         assert_eq!(texts(-0.3, 1.1, 300.0), ["0", "0.5", "1.0"]);
+        assert_eq!(texts(-0.45, 0.45, 120.0), ["−0.4", "0", "0.4"]);
+        assert_eq!(texts(-0.45, 0.45, 60.0), ["0"]);
         assert_eq!(texts(3.98, 5.02, 300.0), ["4.0", "4.2", "4.4", "4.6", "4.8", "5.0"]);
         assert_eq!(texts(0.0, 1000.0, 300.0), ["0", "200", "400", "600", "800", "1000"]);
         assert_eq!(texts(0.0, 1000.0, 120.0), ["0", "500", "1000"], "a narrow chart");

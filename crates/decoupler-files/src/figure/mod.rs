@@ -273,7 +273,7 @@ mod summary_tests {
         let histogram = histogram_figure(&pairs, Decoded::Nodes).summary();
         assert_eq!(
             histogram,
-            "nodes of the test set against error of z (mm), decoded − actual: 41 bars, the highest 2 at 0; no error at 0."
+            "nodes against error of z (mm), decoded − actual: 41 bars, the highest 2 at 0; no error at 0."
         );
         let nodes = [4.5, 4.0, 5.0].map(|z| DVec3::new(1.0, 2.0, z));
         assert_eq!(

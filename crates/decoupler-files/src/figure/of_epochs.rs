@@ -104,7 +104,7 @@ pub fn compared_losses_figure(runs: [Option<(&str, &[EpochRecord])>; 2]) -> Plot
         curves.map(|(name, style, of)| curve(format!("{run}, {name}"), ink, style, &drawn, of))
     });
     let plot = over_epochs(PlotAxis::logarithmic("mse (scaled)"), series);
-    PlotFigure::new([plot], ["Dashed: training; solid: test.".to_owned()])
+    PlotFigure::new([plot], [])
 }
 
 /// Returns the name of [`EpochRecord::parameter`] in all methods of a training.

@@ -81,7 +81,7 @@ pub fn histogram_figure(pairs: &[(f64, f64)], of: Decoded<'_>) -> PlotFigure {
     let mut bars = Series::new(samples, Look::line(Ink::Blue, None), bars).listed(None);
     bars.form = Form::Bars(0.92 * width);
     let x = PlotAxis::linear(format!("error of {}, {answer} − actual", titled(name, unit)));
-    let y = PlotAxis::linear(format!("{samples} of the test set")).including([0.0]);
+    let y = PlotAxis::linear(samples).including([0.0]);
     let no_error = Series::across("no error", LineAt::X(0.0), Ink::Grey, LineStyle::Dashed);
     Plot::new(x, y, [bars, no_error]).into()
 }

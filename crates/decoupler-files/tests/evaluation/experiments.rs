@@ -488,7 +488,7 @@ fn tables_of_a_recording_have_its_error_measures_and_target_names() {
     assert!(table.rows.iter().all(|row| row.len() == headings.len()));
     assert_eq!(
         describe_conditions(&experiment),
-        "forces, Bayesian regularisation, 6 epochs, one start, 2 seeds from 0, the last 20 % of the samples for test"
+        "forces, Bayesian regularisation, 6 epochs, one restart, 2 seeds from 0, the last 20 % of the samples for test"
     );
     let trials = trials_table(&results);
     let fields: Vec<_> = trials.columns.iter().map(|column| column.field.as_str()).collect();

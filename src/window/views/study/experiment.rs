@@ -157,6 +157,10 @@ impl ExperimentForm {
             let offered = Vec::from_iter(offered);
             let names = [("Across", "Values across"), ("Down", "Values down")];
             for (axis, (name, values)) in self.axes.iter_mut().zip(names) {
+                if !offered.iter().any(|(kind, ..)| *kind == axis.kind) {
+                    // The source has no such setting, as a recording no number of samples.
+                    *axis = ValueList::new(AxisKind::Method);
+                }
                 let picked = list_ui(ui, name, "Setting that is varied", &offered, axis.kind);
                 *axis = picked.map_or_else(|| axis.clone(), ValueList::new);
                 axis.ui(ui, Some(values), hint);

@@ -499,7 +499,7 @@ impl TrainView {
         };
         for (by, command) in [(-1, Command::PreviousSection), (1, Command::NextSection)] {
             let stepped = self.section.stepped(by, skin);
-            if offers.offer_unless(command, stepped.is_none().then_some("It is the last one.")) {
+            if offers.offer_unless(command, stepped.is_none().then_some("There is none in this direction.")) {
                 self.section = stepped.unwrap_or(self.section);
             }
         }

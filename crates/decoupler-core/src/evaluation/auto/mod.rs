@@ -36,7 +36,7 @@ use crate::{
     decoupling::Combined,
     network::{InputChoice, Quantity, ScalingChoice},
     problem::Channel,
-    text::format_below_one,
+    text::{counted, format_below_one},
     training::Method,
 };
 pub use channels::dead_channels;
@@ -211,7 +211,7 @@ impl Tried {
 }
 
 impl fmt::Display for TriedModel {
-    /// Writes `ridge`, or `2 × 8 hidden nodes, br`.
+    /// Writes `ridge`, or `average of 2 networks with 8 hidden nodes, Bayesian regularisation`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Mean => f.write_str("mean"),
@@ -225,7 +225,9 @@ impl fmt::Display for TriedModel {
                 is_on_residual,
                 ..
             } => {
-                write!(f, "{starts} × {hidden} hidden nodes, {}", method.short_name())?;
+                let of = if *starts > 1 { "average of " } else { "" };
+                let (networks, nodes) = (counted(*starts, "network"), counted(*hidden, "hidden node"));
+                write!(f, "{of}{networks} with {nodes}, {}", method.name())?;
                 // Candidates that differ in nothing else.
                 if let Method::ScaledConjugateGradient(settings) = method
                     && settings.decay > 0.0

@@ -263,7 +263,7 @@ impl RunReport<'_> {
             remarks.extend(describe_determinacy(&problem.targets, &measured, is_combined));
             remarks.extend(describe_worse_than_ridge(problem, scores));
             let is_optimistic = (plan.test_order() == SplitBy::Random).then_some(
-                "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split by time \
+                "test samples are drawn at random, which is optimistic where neighbouring samples are similar; split by time \
                  or by group for an honest test",
             );
             remarks.extend(is_optimistic.map(str::to_owned));
