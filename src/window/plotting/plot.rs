@@ -22,6 +22,8 @@ const SPAN_TINT: f32 = 0.12;
 const BAND_TINT: f32 = 0.22;
 /// Room for the number at a tick, in points.
 const NUMBER: [f64; 2] = [50.0, 16.0];
+/// Room for half the number at the right end of a plot, in addition to that in a card, in points.
+const BEYOND: f32 = 8.0;
 /// Minimum distance of grid lines, in points; the plot derives its scale from it.
 const MIN_GRID: f32 = 8.0;
 /// Points of a stepped line that are closer than this fraction of an axis are merged: a sharp turn would draw a spike.
@@ -202,7 +204,7 @@ fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
 fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, track: Option<bool>) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
-    let space = ui.available_size();
+    let space = ui.available_size() - Vec2::new(BEYOND, 0.0);
     let painter = ui.painter().clone();
     let axis_hints = |hints: AxisHints<'static>, (axis, length): (&PlotAxis, f32), apart: f32| {
         let described = axis.clone();

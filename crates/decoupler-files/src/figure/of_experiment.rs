@@ -127,7 +127,7 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
         let (root, logarithm) = ([*root.start() as f64, *root.end() as f64], logarithm as f64);
         let logarithm = Series::across("Eq. (13)", LineAt::X(logarithm), Ink::Orange, LineStyle::Solid);
         let root = Series::across("Eq. (12)", LineAt::Between(root), Ink::Orange, None);
-        [root, logarithm.labelled("Eq. (13)")]
+        [root, logarithm]
     });
     let plot = Plot::new(x, y, series.into_iter().chain(suggestions.into_iter().flatten()));
     PlotFigure::new(std::iter::once(plot).chain(r2), [])
