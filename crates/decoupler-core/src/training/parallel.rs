@@ -203,7 +203,8 @@ mod tests {
 
     #[test]
     fn a_matrix_factored_in_pieces_equals_the_product_of_its_factors() {
-        let order = 3 * MAX_UNSPLIT_FACTOR / 2 + 7;
+        // Large enough that the product subtracted from the corner is split, too.
+        let order = 7 * MAX_UNSPLIT_FACTOR / 4 + 7;
         let entry = |row: usize, column: usize| ((row * 31 + column * 17 + row * column) as f64).sin();
         let root = Mat::from_fn(order, order, entry);
         let matrix = &root * root.transpose() + Mat::<f64>::identity(order, order);

@@ -248,7 +248,7 @@ mod tests {
         let hidden = plots_of(PaperTable::HiddenNodes);
         assert_eq!(
             keys(&hidden),
-            ["published", "Eq. (12)"],
+            ["published", "Eq. (12)", "Eq. (13)"],
             "there are no other results yet"
         );
         assert_eq!(hidden.plots[0].series[0].points[3], PlotPoint::from([12.0, 2.28]));
