@@ -329,7 +329,7 @@ struct PointTraining {
 
 /// Legend of the marks at the end of the lines of the table.
 const FRONTS: &str = "* no other decoder is both faster and more accurate; + no other is both trained faster and more accurate\n\
-                      Training time is the sum over all rows and restarts.";
+                      Training time is that of all restarts together, on all threads.";
 
 /// A limit, and the index of the best point within it; none if no point is.
 type Choice = (f64, Option<usize>);

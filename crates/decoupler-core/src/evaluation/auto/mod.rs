@@ -277,9 +277,9 @@ impl AutoRecord {
     pub fn leaks(&self, targets: &[Channel]) -> impl Iterator<Item = String> {
         self.leaks.iter().map(|(target, [now, past])| {
             format!(
-                "possible leak: the history of readings predicts {} (R² {}), but the readings of the moment do not (R² {}). Either the order \
-                 of recording gives it away, which does not help in use, or the sensor responds to changes only; give a memory \
-                 if it is the latter",
+                "possible leak: the history of readings predicts {} (R² {}), but the readings of the moment do not (R² {}). \
+                 Either the order of recording gives it away, which does not help in use, or the sensor responds to changes \
+                 only; use the history if it is the latter",
                 targets.get(*target).map_or("a target", |target| &target.name),
                 format_below_one(*past, 2),
                 format_below_one(*now, 2)
