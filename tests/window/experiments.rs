@@ -332,7 +332,7 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     driver.settle();
     assert!(
         driver.is_enabled("▶ Run"),
-        "a recording has no number of samples to vary: {:#?}",
+        "both axes can be varied: {:#?}",
         driver.texts()
     );
     driver.choose("Down", "Scaling");

@@ -136,14 +136,7 @@ impl PlotAxis {
         }
         let least = apart.max(width / MAX_PARTS);
         match &self.scale {
-            Scale::Linear => {
-                let (step, end) = (round_step(least), range.end().max(-range.start()));
-                let decade = 10_f64.powi(end.log10().floor() as i32);
-                let digit = (end / decade).floor() * decade;
-                // A zero alone gives no scale: then the largest number of one digit, if there is room.
-                let is_alone = *range.start() < 0.0 && *range.end() > 0.0 && end < step && digit > 0.8 * least;
-                Ticks::at_multiples(range, if is_alone { digit } else { step })
-            }
+            Scale::Linear => Ticks::at_multiples(range, linear_step(range, least)),
             Scale::Logarithmic => logarithmic_ticks(range, apart, least),
             Scale::Multiples(unit) => Ticks::at_multiples(range, unit * round_step(least / unit).max(1.0)),
             Scale::Hidden => Ticks::default(),
@@ -195,6 +188,17 @@ pub(super) fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
     (place - range.start()) / (range.end() - range.start())
 }
 
+/// A round step, at least `least`. Where only zero would be a multiple, which gives no scale, it is the largest number of one
+/// digit in the range, if there is room.
+fn linear_step(range: &RangeInclusive<f64>, least: f64) -> f64 {
+    let (step, end) = (round_step(least), range.end().max(-range.start()));
+    let decade = decade_below(end);
+    let digit = (end / decade).floor() * decade;
+    let is_zero_alone = *range.start() < 0.0 && *range.end() > 0.0 && end < step;
+    let is_digit = is_zero_alone && digit > 0.8 * least;
+    if is_digit { digit } else { step }
+}
+
 /// Whole decades; 2 and 5 between them where there is room; round numbers within less than a decade.
 fn logarithmic_ticks(range: &RangeInclusive<f64>, apart: f64, least: f64) -> Ticks {
     let (low, high, two) = (*range.start(), *range.end(), 2.0_f64.log10());
@@ -235,9 +239,14 @@ fn power_text(log: f64, range: &RangeInclusive<f64>) -> String {
     format!("{short}{power}").replace('-', "−")
 }
 
+/// Returns the largest power of ten up to a positive value.
+fn decade_below(value: f64) -> f64 {
+    10_f64.powi(value.log10().floor() as i32)
+}
+
 /// Returns 1, 2 or 5 times a power of ten, at least `smallest`.
 fn round_step(smallest: f64) -> f64 {
-    let decade = 10_f64.powi(smallest.log10().floor() as i32);
+    let decade = decade_below(smallest);
     let steps = [1.0, 2.0, 5.0].map(|factor| factor * decade).into_iter();
     let mut large = steps.filter(|step| *step >= smallest * (1.0 - 1e-9));
     large.next().unwrap_or(10.0 * decade)

@@ -103,8 +103,7 @@ pub fn compared_losses_figure(runs: [Option<(&str, &[EpochRecord])>; 2]) -> Plot
     let series = series.flat_map(|(run, drawn, ink)| {
         curves.map(|(name, style, of)| curve(format!("{run}, {name}"), ink, style, &drawn, of))
     });
-    let plot = over_epochs(PlotAxis::logarithmic("mse (scaled)"), series);
-    PlotFigure::new([plot], [])
+    over_epochs(PlotAxis::logarithmic("mse (scaled)"), series).into()
 }
 
 /// Returns the name of [`EpochRecord::parameter`] in all methods of a training.

@@ -158,7 +158,7 @@ impl ExperimentForm {
             let names = [("Across", "Values across"), ("Down", "Values down")];
             for (axis, (name, values)) in self.axes.iter_mut().zip(names) {
                 if !offered.iter().any(|(kind, ..)| *kind == axis.kind) {
-                    // The source has no such setting, as a recording no number of samples.
+                    // The source has no such setting: the samples of a recording are given.
                     *axis = ValueList::new(AxisKind::Method);
                 }
                 let picked = list_ui(ui, name, "Setting that is varied", &offered, axis.kind);
